@@ -22,10 +22,9 @@ def __dir__() -> list[str]:
 
 
 def __getattr__(name: str) -> Any:
-    """Return what ``sbafab.api`` has of this name; it is loaded when first asked for.
+    """Return the attribute of ``sbafab.api`` with this name, loaded on demand.
 
-    Loaded so and not by a statement, ``sbafab --help`` loads no geometry, and no circle of imports
-    runs through this module.
+    A statement would load the geometry for ``sbafab --help``, and form a circle of imports.
     """
     if name == "__all__" or not name.startswith("_"):
         from importlib import import_module

@@ -1,4 +1,4 @@
-"""``python -m sbafab``: the command where no script of it is on the path."""
+"""``python -m sbafab``: the command without its script on the path."""
 
 from sbafab.entry import main
 

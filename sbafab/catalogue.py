@@ -1,4 +1,4 @@
-"""The catalogue of rules and checks, ``rules/sentences.toml``: what each explains and says."""
+"""The catalogue of rules and checks, ``rules/sentences.toml``: explanations and messages."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ def _tables() -> Mapping[str, Any]:
 
 
 def names(group: Group) -> tuple[str, ...]:
-    """Return the names of the rules or checks of a group, in their order; of rules ours alone."""
+    """Return the names of the rules or checks of a group, in order; for rules, only our own."""
     return tuple(_tables()[group])
 
 
 @cache
 def catalogue() -> Mapping[str, Any]:
-    """Return the tables of all rules and checks by name, in their order, and the common words."""
+    """Return the tables of all rules and checks by name, in order, and the common words."""
     groups = (_tables()[group] for group in get_args(Group))
     return {"words": _tables()["words"]} | {k: v for group in groups for k, v in group.items()}

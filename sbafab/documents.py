@@ -1,4 +1,4 @@
-"""Documents for programs: JSON, and its published schema, from one statement of the fields."""
+"""Documents for programs: JSON and its published schema, from one declaration of the fields."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ class Described(BaseModel):
     """A table whose schema describes each key by its docstring.
 
     A validator is built when the first table is read, and docstrings of keys are read when a schema
-    is requested: a command needs some of the tables only. So a default that is a table is made by
-    ``model_construct()``, which needs no validator.
+    is requested, since a command needs only some tables. Therefore a default that is a table is
+    made by ``model_construct()``, which needs no validator.
     """
 
     model_config = ConfigDict(defer_build=True)
@@ -51,9 +51,9 @@ class Described(BaseModel):
 
 @functools.cache
 def _descriptions(record: type[Described]) -> tuple[tuple[str, str], ...]:
-    """The keys of a record, without inherited ones, and their docstrings.
+    """Return the keys of a record, without inherited ones, and their docstrings.
 
-    Python parses the whole module to find a class, and many records inherit the same.
+    Python parses the whole module to find a class, and many records inherit the same keys.
     """
     (body,) = ast.parse(textwrap.dedent(inspect.getsource(record))).body
     assert isinstance(body, ast.ClassDef)
@@ -95,10 +95,7 @@ class Document(Described):
 
 
 def json_schema(record: Any, identity: str) -> dict[str, Any]:
-    """Return the JSON schema of a record or document that is written below its id.
-
-    A list of records has no id.
-    """
+    """Return the JSON schema of a record or document that is written below its id."""
     body = TypeAdapter(record).json_schema(mode="serialization")
     if "properties" not in body:
         return body
@@ -108,7 +105,7 @@ def json_schema(record: Any, identity: str) -> dict[str, Any]:
 
 
 class _Joined:
-    """A record with more attributes."""
+    """A record with additional attributes."""
 
     def __init__(self, record: object, more: dict[str, object]) -> None:
         self._record = record
@@ -119,7 +116,7 @@ class _Joined:
 
 
 def attribute(path: str) -> Any:
-    """Return a field that stands elsewhere in the record: a dotted path to it.
+    """Return a field with a value elsewhere in the record: a dotted path to it.
 
     It is None if an attribute on the path is.
     """

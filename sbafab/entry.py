@@ -1,7 +1,7 @@
 """The entry point of the ``sbafab`` command, where Ctrl-C ends the process at once.
 
 An interrupt raised during imports may be lost or become another error, and before a command runs
-there is nothing to tidy up.
+there is nothing to clean up.
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ STOPPED = "stopped; the output folder is complete: either the earlier one or the
 
 
 class Stopped(KeyboardInterrupt):
-    """An interrupt with a sentence about the work that it stopped, and the number of the signal."""
+    """An interrupt with a sentence about the interrupted work, and the number of the signal."""
 
     def __init__(self, sentence: str, *number: object) -> None:
         super().__init__(*number)
@@ -18,7 +18,7 @@ class Stopped(KeyboardInterrupt):
 
 
 class SbafabError(Exception):
-    """Base of all errors with a message for the user."""
+    """The base of all errors with a message for the user."""
 
 
 class DesignError(SbafabError, ValueError):
@@ -30,7 +30,7 @@ class UnreachableError(DesignError):
 
 
 class BeyondError(DesignError):
-    """A state that a film does not stand; ``excess`` is by what share it is beyond."""
+    """A state beyond a film's limit; ``excess`` is the fraction by which it exceeds the limit."""
 
     def __init__(self, sentence: str, excess: float = 0.0) -> None:
         super().__init__(sentence)
@@ -51,18 +51,18 @@ class OccupiedError(OutputError):
 
 
 class VoidError(OutputError):
-    """A simulation whose result cannot be; the exit code is that of a failed rule."""
+    """A simulation with an impossible result; the exit code is that of a failed rule."""
 
 
 class DefectError(SbafabError):
-    """Files that the program wrote and that differ from the design: a defect of the program."""
+    """Written files that differ from the design: a defect of the program."""
 
 
 # Errors of geometry.
 
 
 class GeometryError(SbafabError, ArithmeticError):
-    """An operation on regions with an inconsistent result; the message names the place."""
+    """An operation on regions with an inconsistent result; the message gives the location."""
 
 
 class InconsistentError(ArithmeticError):

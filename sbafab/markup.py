@@ -1,5 +1,5 @@
 """Escaping of text in XML as in ``xml.sax.saxutils``, whose import loads all of HTTP; templates;
-tables for notebooks, in HTML and of pandas.
+tables for notebooks, in HTML and pandas.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SPACES = {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"}
 
 
 def escape(text: str) -> str:
-    """Return text escaped for a place between tags."""
+    """Return text escaped for use between tags."""
     return html_escape(text, quote=False)
 
 

@@ -1,8 +1,9 @@
-"""What packages may add, by name: the program's own and, by entry points, those of other packages.
+"""Extensions of packages, by name: the program's own entries and, by entry points, those of other
+packages.
 
-Both are entries, ``module:attribute``, and are loaded by one function. The program's own stand in
-its source and not in the metadata of its installation, so that a checkout, a page in the browser or
-an installation of yesterday has all of them.
+Both are entries, ``module:attribute``, and are loaded by one function. The program's own are in its
+source and not in the metadata of its installation, so that a checkout, a page in the browser or an
+outdated installation has all of them.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ Kind = TypeVar("Kind")
 
 @cache
 def _every() -> Any:
-    """The entry points of all installed packages: a search among many takes 0.03 s."""
+    """Return the entry points of all installed packages: a search among many takes 0.03 s."""
     from importlib.metadata import entry_points
 
     return entry_points()
@@ -38,18 +39,18 @@ def installed(group: str) -> tuple[EntryPoint, ...]:
 
 
 def load(entry: str) -> Any:
-    """Return the object that an entry names: ``module:attribute``, or a module alone."""
+    """Return the object of an entry: ``module:attribute``, or a module."""
     name, _, attribute = entry.partition(":")
     module = import_module(name)
     return getattr(module, attribute) if attribute else module
 
 
 class Plugins(Mapping[str, Kind], Generic[Kind]):
-    """What a group has by name: the program's ``own``, then what installed packages add.
+    """The named entries of a group: the program's ``own``, then those of installed packages.
 
-    An entry is loaded when it is first asked for, and packages are searched only for a name that is
-    not among ours, or for all names. ``noun`` is what messages call an entry. Raises DesignError
-    where a package's entry cannot be loaded, is of another ``kind``, or takes a name in use.
+    An entry is loaded on demand, and packages are searched only for a name that is not ours, or for
+    all names. ``noun`` is the word for an entry in messages. Raises DesignError if a package's
+    entry cannot be loaded, is not a ``kind``, or uses an existing name.
     """
 
     def __init__(self, group: str, noun: str, kind: type[Kind], own: Mapping[str, str]) -> None:
@@ -69,12 +70,12 @@ class Plugins(Mapping[str, Kind], Generic[Kind]):
 
     @property
     def _added(self) -> dict[str, EntryPoint]:
-        """The entries of installed packages by name."""
+        """Return the entries of installed packages by name."""
         added: dict[str, EntryPoint] = {}
         for entry in installed(self.group):
             if entry.name in self.own or entry.name in added:
                 raise DesignError(
-                    f"{self.noun} {entry.name} is there already; uninstall one of the packages "
+                    f"{self.noun} {entry.name} already exists; uninstall one of the packages "
                     "that add it"
                 )
             added[entry.name] = entry
@@ -98,6 +99,6 @@ class Plugins(Mapping[str, Kind], Generic[Kind]):
 
 
 def added(group: str, noun: str, kind: type[Kind], own: Iterable[str] = ()) -> tuple[Kind, ...]:
-    """Return what installed packages add to a table, whose ``own`` rows have these names."""
+    """The additions of installed packages to a table, whose ``own`` rows have these names."""
     rows = Plugins(group, noun, kind, dict.fromkeys(own, ""))
     return tuple(rows[name] for name in rows if name not in rows.own)

@@ -29,11 +29,11 @@ def prepare() -> None:
 
 
 class OneBlasThread(ContextDecorator):
-    """Linear algebra on one thread, in this process, while any thread of it is in here.
+    """Run linear algebra on one thread, in this process, while any of its threads is inside.
 
-    As decorator or context manager, of which one may be in another. Our matrices are small: more
-    threads wait for each other, a hundredfold where they are more than processors. What the
-    caller had set holds again afterwards.
+    It is a nestable decorator or context manager. Our matrices are small: more threads wait for
+    each other, a hundred times longer if there are more than processors. The caller's settings are
+    restored afterwards.
     """
 
     def __init__(self) -> None:
@@ -55,7 +55,7 @@ class OneBlasThread(ContextDecorator):
 
 @cache
 def _thread_pools() -> Any:
-    """Return the thread pools of numpy's linear algebra, which has been loaded by then."""
+    """Return the thread pools of NumPy's linear algebra, which is already loaded."""
     from threadpoolctl import ThreadpoolController
 
     return ThreadpoolController()
@@ -65,7 +65,7 @@ one_blas_thread = OneBlasThread()
 
 
 def processors() -> int:
-    """Return how many processors this process may use."""
+    """Return the number of processors available to this process."""
     try:
         return len(os.sched_getaffinity(0))
     except AttributeError:

@@ -1,5 +1,5 @@
 """CSV for spreadsheets, in which no text is read as a formula; and filled-in tables, which are read
-where they can be read in one way, or refused.
+if they are unambiguous, or refused.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ TEXT_MARK = "'"
 def csv_text(rows: Iterable[Sequence[Any]]) -> str:
     """Return rows as the text of a CSV file: commas, a line feed after each, None as an empty cell.
 
-    Numbers are written as they are; a text that would be a formula gets TEXT_MARK before it.
+    Numbers are written unchanged; a text that would be a formula gets the prefix TEXT_MARK.
     """
     text = StringIO()
     csv.writer(text, lineterminator="\n").writerows([_cell(value) for value in row] for row in rows)
@@ -36,7 +36,7 @@ def _cell(value: Any) -> Any:
 
 
 def plain_text(text: str) -> str:
-    """Return the text with TEXT_MARK before what a spreadsheet would read as a formula.
+    """Return the text with TEXT_MARK as prefix if a spreadsheet would read it as a formula.
 
     Its lines end with a line feed: Python 3.11 writes a lone carriage return without quotes.
     """
@@ -73,12 +73,12 @@ def table_text(path: Path) -> str:
 def table_rows(
     path: Path, columns: Collection[str] = (), numbers: Collection[str] = ()
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield the filled rows below the header, by column, with their places; ``#`` begins a remark.
+    """Yield the filled rows below the header, by column, with their places; ``#`` starts a comment.
 
     Columns are separated by commas, semicolons or tabs; numbers have a decimal point or comma. A
-    spreadsheet that separates columns by semicolons leaves our commas in its first cell; that is
-    read too. Raises DesignError if one of ``columns`` is missing, and if decimal commas of
-    ``numbers`` cannot be told from column separators.
+    spreadsheet that separates columns by semicolons leaves our commas in its first cell, which is
+    also read. Raises DesignError if one of ``columns`` is missing, and if decimal commas of
+    ``numbers`` cannot be distinguished from column separators.
     """
     lines = [
         (f"{path}, line {number}", line)
@@ -102,24 +102,24 @@ def table_rows(
 
 
 def _cells(line: str, separator: str, where: str) -> list[str]:
-    """Return the cells of a row, blanks round them removed."""
+    """Return the cells of a row without surrounding spaces."""
     try:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, strict=True))]
     except StopIteration:
         return []
     except csv.Error:
-        raise DesignError(f"{where} has a quotation mark without its other; remove it") from None
+        raise DesignError(f"{where} has an unmatched quotation mark; remove it") from None
 
 
 def _stripped(cells: list[str], least: int) -> list[str]:
-    """Return the cells without the empty ones at the end, down to ``least`` of them."""
+    """Return the cells without trailing empty ones, down to ``least`` of them."""
     while len(cells) > least and not cells[-1]:
         cells = cells[:-1]
     return cells
 
 
 def _mixed(line: str, count: int, where: str) -> list[str] | None:
-    """Return the cells of a row under a header with commas, if semicolons separate its cells."""
+    """Return the cells of a row separated by semicolons, under a header with commas."""
     parted = _stripped(_cells(line, ";", where), 1)
     first = _cells(parted[0], ",", where)
     if len(parted) == count:
@@ -135,7 +135,7 @@ def _row(line: str, separator: str, count: int, where: str) -> list[str]:
     cells = _stripped(_cells(line, separator, where), count)
     if len(cells) != count:
         raise DesignError(
-            f"{where} has {len(cells)} cells where the header has {count}{_remedy(separator)}"
+            f"{where} has {len(cells)} cells, but the header has {count}{_remedy(separator)}"
         )
     return cells
 
@@ -149,11 +149,11 @@ def _remedy(separator: str) -> str:
 def _refuse_two_ways(
     cells: list[str], names: list[str], separator: str, numbers: Collection[str], where: str
 ) -> None:
-    """Raise DesignError for a number that may go on, behind its comma, in the cell after it."""
+    """Raise DesignError for a number that may continue, after its comma, in the next cell."""
     for place, (name, after) in enumerate(zip(names, names[1:], strict=False)):
         whole, part = cells[place : place + 2]
         is_split = separator == "," and name in numbers and after not in numbers
         if is_split and _WHOLE.fullmatch(whole) and _WHOLE.fullmatch(part):
             raise DesignError(
-                f"{where} may say {whole} or {whole},{part} for {name}{_remedy(separator)}"
+                f"{where} may mean {whole} or {whole},{part} for {name}{_remedy(separator)}"
             )

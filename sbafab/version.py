@@ -1,4 +1,4 @@
-"""The version of the program, and the name by which written files know their generator."""
+"""The version of the program, and the name by which written files identify their generator."""
 
 from __future__ import annotations
 

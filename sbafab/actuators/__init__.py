@@ -1,7 +1,7 @@
 """Actuator families by name: each module holds a family's design record and builds its laminate.
 
-In: the tables of a design file. Out: a ``Design`` of its family (``load_design``), and of that
-the ``Laminate`` (``build``).
+Input: the tables of a design file. Output: a ``Design`` of its family (``load_design``), and its
+``Laminate`` (``build``).
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def load_design(
 def build(design: Design) -> Laminate:
     """Return the laminate of a design of any family. Raises DesignError if parts do not fit.
 
-    Its notes state the size of a drawn outline, and that the actuator meets ``fits``.
+    Its notes state the size of a drawn outline, and compliance with ``fits``.
     """
     laminate = FAMILIES[design.family].build(design)
     fits = getattr(design, FITS, None)

@@ -1,4 +1,4 @@
-"""Laminates of drawn layers: the design file has each layer's role and its shape by name."""
+"""Laminates of drawn layers: the design file gives each layer's role and names its shape."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ MOST_LAYERS = 500
 
 
 class DrawnLayer(Section):
-    """A layer: what it is for, its shape by name, and how many parts it is meant to have."""
+    """A layer: its role, the name of its shape, and its intended number of parts."""
 
     role: Role
     """Role of the layer: base, wall, cap or sheet of a structural film, or a mask."""
@@ -65,7 +65,7 @@ class DrawnLayer(Section):
 
 
 class DrawnChamber(Section):
-    """A chamber, and the inlet strip through which it is filled."""
+    """A chamber, and the inlet strip that fills it."""
 
     name: str = Field(pattern=NAME_PATTERN)
     """Its name in findings and on pages."""
@@ -84,7 +84,7 @@ class DrawnChamber(Section):
 
 
 class DrawnPin(Section):
-    """A dowel pin of the press fixture; it holds every layer with a hole that fits."""
+    """A dowel pin of the press fixture; it holds every layer with a fitting hole."""
 
     name: str = Field(pattern=NAME_PATTERN)
     """Its name in the fixture and on pages."""
@@ -125,7 +125,7 @@ class DrawnSeam(Section):
         if self.shape is not None and self.closed:
             raise ValueError("has a shape, whose boundary is closed; remove closed")
         if self.path is not None and any(a[:2] == b[:2] for a, b in pairwise(self.path)):
-            raise ValueError("has one corner of its path twice in a row; remove one")
+            raise ValueError("repeats a corner of its path; remove one")
         return self
 
 
@@ -140,7 +140,7 @@ class DrawnFold(Section):
     @model_validator(mode="after")
     def _has_a_line(self) -> Self:
         if self.line[0] == self.line[1]:
-            raise ValueError("has a line whose ends are one point; move one of them")
+            raise ValueError("has a line with coincident ends; move one of them")
         return self
 
 
@@ -158,7 +158,7 @@ class DrawnPort(Section):
 
 
 class NamedNets(NamedTables):
-    """The nets by name: ports and chambers that voids join, and that nothing else is joined to."""
+    """Nets by name: ports and chambers that voids connect, and that connect to nothing else."""
 
     what, names = "net", NAME_PATTERN
     names_are = "of letters, digits, dots, - and _, 64 at most"
@@ -171,9 +171,10 @@ DRAWN = "drawn"
 
 
 class DrawnDesign(Design):
-    """Layers whose shapes are drawn, bottom to top. Never built: rules read them like any
-    laminate's, and predictions omit what has no model. ``bore.diameter`` moves no shape: rules and
-    pins read it.
+    """Layers whose shapes are drawn, bottom to top.
+
+    Families do not build them; rules read them like any laminate, and predictions omit parts
+    without a model. ``bore.diameter`` changes no shape: only rules and pins read it.
     """
 
     unused: ClassVar[Mapping[str, str]] = {
@@ -246,7 +247,7 @@ class DrawnDesign(Design):
 
     @property
     def lumen_pin(self) -> float | None:
-        """Diameter of the pin in the lumen, if there is one."""
+        """The diameter of the lumen's pin, if there is one."""
         middle = (pin.diameter for pin in self.pins or () if pin.at == (0.0, 0.0))
         return next(middle, self.lumen) if self.lumen is not None else None
 
@@ -270,7 +271,7 @@ class DrawnDesign(Design):
 
     @property
     def stated_folds(self) -> tuple[Fold, ...]:
-        """The folds, their lines as they are drawn."""
+        """The folds, with their lines as drawn."""
         return tuple(Fold(*fold.layers, fold.line) for fold in self.folds or ())
 
     @property
@@ -406,7 +407,7 @@ def _faults(design: DrawnDesign) -> Iterator[str]:
 
 
 def _faults_of_names(design: DrawnDesign) -> Iterator[str]:
-    """Yield missing chambers, and names and centres given twice."""
+    """Yield missing chambers, and duplicate names and centres."""
     chambers, ports = design.chambers, design.ports or ()
     if not chambers and not any(port.kind == "hole" for port in ports):
         yield (
@@ -428,7 +429,7 @@ def _faults_of_names(design: DrawnDesign) -> Iterator[str]:
 
 
 def _faults_of_joints(design: DrawnDesign) -> Iterator[str]:
-    """Yield folds, seams and ports that lie between no neighbouring films."""
+    """Yield folds, seams and ports that do not lie between neighbouring films."""
     ports = design.ports or ()
     pairs = design.chamber_gaps
     joints = [
@@ -457,7 +458,7 @@ def _twice(values: Sequence[Any]) -> list[Any]:
 
 
 def _faults_of_order(roles: Sequence[str]) -> Iterator[str]:
-    """Yield what makes layers no stack."""
+    """Yield the reasons why layers form no stack."""
     masks = [role.endswith("-mask") for role in roles]
     if masks.count(False) < 2:
         yield f"layers has {masks.count(False)} structural films; a laminate has two at least"
@@ -476,7 +477,7 @@ def _faults_of_order(roles: Sequence[str]) -> Iterator[str]:
 
 
 def _faults_of_nets(design: DrawnDesign) -> Iterator[str]:
-    """Yield members of nets that do not exist, or are in two nets."""
+    """Yield members of nets that do not exist, or that are in two nets."""
     names = [chamber.name for chamber in design.chambers]
     names += [port.name for port in design.ports or ()]
     home: dict[str, str] = {}
@@ -496,7 +497,7 @@ LEAST_OVERLAP = 1e-4
 
 
 def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
-    """The layers, with face-down ones turned over, and folded ones with separate patterns."""
+    """Return the layers, with face-down ones turned over, and folded ones as separate patterns."""
     turned = {number: bool(row.turned) for number, row in enumerate(design.layers, start=1)}
     for fold in design.stated_folds:
         # A film that is folded over lies with its other face up.
@@ -515,7 +516,7 @@ def _turned(stack: tuple[Layer, ...], design: DrawnDesign) -> tuple[Layer, ...]:
 
 
 def _faults_of_folds(laminate: Laminate, design: DrawnDesign) -> Iterator[str]:
-    """Yield folds at which no film can be folded."""
+    """Yield folds about which a film cannot be folded."""
     uppers = [fold.upper for fold in laminate.folds]
     for fold, stated in zip(laminate.folds, design.stated_folds, strict=True):
         lower, upper = laminate.layer(fold.lower), laminate.layer(fold.upper)

@@ -43,7 +43,7 @@ def reach(region: Region, direction: Point) -> float:
 
 @dataclass(frozen=True)
 class Ray:
-    """Ray of an ear: it starts inside the part and runs outward.
+    """A ray for an ear: it starts inside the part and runs outward.
 
     ``long`` is the second ear of its part. A mask ear that starts beside its mask is joined to it
     from ``joint``, a point of the mask.
@@ -57,19 +57,19 @@ class Ray:
     joint: Point | None = None
 
     def at(self, distance: float, aside: float = 0.0) -> Point:
-        """A point on the ray, or to the left of it."""
+        """Return a point on the ray, or to the left of it."""
         (x, y), (dx, dy) = self.start, self.direction
         return x + dx * distance - dy * aside, y + dy * distance + dx * aside
 
     def reach(self, body: Region, width: float) -> float:
-        """Reach of a body along the ray, in a band of this width, mm."""
+        """Return the extent of a body along the ray, in a band of this width, mm."""
         (x, y), band = self.start, strip(self.start, self.at(FAR), width) & body
         return 0.0 if band.is_empty else reach(band.moved(-x, -y), self.direction)
 
 
 @dataclass(frozen=True)
 class Ear:
-    """An ear on its ray: masks leave it free from ``root`` to its ``end``; its ``pin``."""
+    """An ear on its ray, free of masks from ``root`` to its ``end``; its ``pin``."""
 
     ray: Ray
     root: float
@@ -89,17 +89,17 @@ class Ear:
 def film_setback(design: Design) -> float:
     """Return the setback of the TPE's bores and lumen from the masks', mm.
 
-    With channel pins all share the pin's edge; without, every mask overhangs.
+    With channel pins all share the pin's edge; without pins, every mask overhangs.
     """
     return 0.0 if design.registration.method == "channel-pin" else design.mask.overhang
 
 
 def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) -> tuple[Ear, ...]:
-    """Return ears on their rays, with roots clear of ``body``: everything cut, without ears.
+    """Return ears on their rays, with roots clear of ``body``: all cut parts, without ears.
 
-    ``plates`` are the films that masks separate; their fillets beside the ears end at the root too.
-    Raises DesignError if a film ear starts outside the films, if two ears are nearer to each other
-    than one overhang, or if fillets fill all the room beside an ear.
+    ``plates`` are the films that masks separate; their fillets beside the ears also end at the
+    root. Raises DesignError if a film ear starts outside the films, if two ears are closer than one
+    overhang, or if fillets fill the room beside an ear.
     """
     overhang, radius = design.mask.overhang, design.fillet.radius
     # In the way of an ear and the mask round it.
@@ -108,8 +108,8 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
         if ray.holder == "film" and not plates.contains(ray.start):
             x, y = ray.start
             raise DesignError(
-                f"the ear {ray.name} starts at x {x:.3f}, y {y:.3f}, outside the films; make the "
-                'chamber larger there, or use registration.method = "channel-pin"'
+                f"the ear {ray.name} starts at x {x:.3f}, y {y:.3f}, outside the films; enlarge "
+                'the chamber there, or use registration.method = "channel-pin"'
             )
     roots = [r.reach(body, band) + radius + overhang + LONGER[r.holder][r.long] for r in rays]
     ears = [_ear(ray, root, design) for ray, root in zip(rays, roots, strict=True)]
@@ -131,7 +131,7 @@ def placed(rays: Sequence[Ray], body: Region, plates: Region, design: Design) ->
 
 
 def _width(design: Design) -> float:
-    """Width of an ear or a tail's head: a hole, and a bond round it."""
+    """Return the width of an ear or a tail's head: a hole, and a bond around it."""
     return design.registration.hole_diameter + 2 * design.bond.width
 
 
@@ -148,7 +148,7 @@ def _pin(name: str, place: Point, design: Design) -> Pin:
 
 
 def with_film_ears(outline: Region, ears: Sequence[Ear], radius: float) -> Region:
-    """A TPE outline with its ears, their concave corners filleted; every piece by itself."""
+    """A TPE outline with its ears and filleted concave corners, for each piece separately."""
     if not ears:
         return outline
     strips = [(ear.ray.start, ear.strip) for ear in ears if ear.ray.holder == "film"]
@@ -159,7 +159,7 @@ def with_film_ears(outline: Region, ears: Sequence[Ear], radius: float) -> Regio
 
 
 def filleted(outline: Region, ears: Sequence[Ear], radius: float) -> Region:
-    """A TPE outline with the fillets beside its ears, without the ears themselves."""
+    """Return a TPE outline with the fillets beside its ears, without the ears themselves."""
     strips = union(ear.strip for ear in ears if ear.ray.holder == "film")
     return with_film_ears(outline, ears, radius) - (strips - outline)
 
@@ -177,7 +177,7 @@ def _openings(pins: Iterable[Pin]) -> Region:
 
 
 def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region:
-    """A separator mask, grown from an eared outline, that leaves film ears free and has its own."""
+    """A separator mask, grown from an eared outline, with its own ears and clear of film ears."""
     if not ears:
         return mask
     beyond = [
@@ -195,13 +195,13 @@ def with_mask_ears(mask: Region, ears: Sequence[Ear], overhang: float) -> Region
 
 
 def with_sheet_ears(sheet: Region, ears: Sequence[Ear], radius: float) -> Region:
-    """The sheet of a radial laminate with its own ears and their holes."""
+    """Return the sheet of a radial laminate with its ears and their holes."""
     strips = [ear.strip for ear in ears if ear.ray.holder == "sheet"]
     return fillet(union([sheet, *strips]), radius) - _holes(ears, "sheet") if strips else sheet
 
 
 def check_apart(pairs: Iterable[tuple[Named, Named]], overhang: float) -> None:
-    """Raises DesignError if two parts are nearer to each other than one overhang."""
+    """Raise DesignError if two parts are closer than one overhang."""
     for (name, part), (name_b, neighbour) in pairs:
         if not (grow(part, overhang) & neighbour).is_empty:
             raise DesignError(
@@ -241,7 +241,7 @@ def tails(
     """Return a tail for every inlet; none without ears.
 
     ``outline`` is the union of all plates, ``under`` other cut parts. Raises DesignError if a tail
-    is nearer than one overhang to an ear or another tail.
+    is closer than one overhang to an ear or another tail.
     """
     if not ears:
         return ()

@@ -24,8 +24,8 @@ ROUNDING = 1e-6
 
 
 class Fits(Section):
-    """Envelope that the actuator must fit; without ``chamber.diameter`` the largest chamber is
-    chosen.
+    """The envelope that the actuator must fit; without ``chamber.diameter`` the largest chamber
+    that fits is used.
     """
 
     diameter: Length | None = None
@@ -55,7 +55,7 @@ def fitted(design: AnyDesign, fits: Fits, build: Callable[[AnyDesign], Laminate]
             return error
 
     def excess(steps: int) -> float:
-        """Return the excess width of the design, mm; a chamber too small to be built has none."""
+        """Return the excess width of the design, mm; 0 for a chamber too small to build."""
         laminate = plan(steps)
         if isinstance(laminate, DesignError):
             return -math.inf
@@ -86,16 +86,16 @@ def refuse_unfit(design: Design, fits: Fits, laminate: Laminate) -> str | None:
         scope = f"{'with' if key == 'diameter' else 'without'} {over}"
         if size > limit + ROUNDING:
             raise DesignError(
-                f"{design.name} measures {size:.3f} mm across {scope}, and fits.{key} = {limit:g}; "
-                f"leave chamber.diameter out to have it solved, or make fits.{key} at least "
-                f"{size:.3f}"
+                f"{design.name} measures {size:.3f} mm across {scope}, and fits.{key} = "
+                f"{limit:g}; omit chamber.diameter so that it is solved, or increase fits.{key} "
+                f"to at least {size:.3f}"
             )
         sizes.append(f"{size:.3f} mm across {scope}, within fits.{key} = {limit:g}")
     return "; ".join(sizes) or None
 
 
 def _sizes(fits: Fits, laminate: Laminate) -> list[tuple[str, float, float]]:
-    """Key, limit and size of the laminate, mm, for every limit that is set."""
+    """Return key, limit and size of the laminate, mm, for every limit that is set."""
     measures = {"diameter": overall_diameter, "outline": outline_diameter}
     limits = fits.model_dump(exclude_none=True)
     return [(key, limit, measures[key](laminate)) for key, limit in limits.items()]
@@ -107,7 +107,7 @@ def _with_chamber(design: AnyDesign, diameter: float) -> AnyDesign:
 
 
 def _room(fits: Fits, laminate: Laminate) -> str:
-    """Remedies that make room for a laminate; ``fits.outline`` does not include tabs."""
+    """Return remedies that make room for a laminate; ``fits.outline`` excludes tabs."""
     also = {"diameter": " (or shorten inlet.tab_length)", "outline": ""}
     remedies = [
         f"fits.{key} at least {math.ceil((size - ROUNDING) * 1000) / 1000:.3f}{also[key]}"

@@ -1,4 +1,4 @@
-"""Lobed actuators: N chambers round a lumen; the paper's 3-DoF actuator is N = 3 (Sec. 2)."""
+"""Lobed actuators: N chambers around a lumen; the paper's 3-DoF actuator has N = 3 (Sec. 2)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ ROUNDING = 1e-9
 
 
 class LobedChamber(RoundChamber):
-    """Round chambers in a circle about the lumen, or drawn ones."""
+    """Round chambers on a circle about the lumen, or drawn chambers."""
 
     count: int = Field(default=3, ge=2, le=8)
     """Chambers round the lumen."""
@@ -49,12 +49,12 @@ class Lumen(Section):
 
     @property
     def pin(self) -> float:
-        """Diameter of the lumen's dowel pin."""
+        """The diameter of the lumen's dowel pin."""
         return self.diameter if self.pin_diameter is None else self.pin_diameter
 
 
 class LobedDesign(Design):
-    """Two to eight chambers in parallel round a central lumen."""
+    """Two to eight parallel chambers around a central lumen."""
 
     model_config = card(
         "Lobed",
@@ -90,10 +90,11 @@ class LobedDesign(Design):
 
 
 def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str | None]:
-    """Return the distance of the chamber axes from the lumen's axis, and a note if it was raised.
+    """Return the distance of the chamber axes from the lumen's axis, and a note if it was
+    increased.
 
-    One bond width lies between lumen and pockets, and between neighbouring pockets; each pocket is
-    kept within its own sector. Raises DesignError if the given radius is too small.
+    One bond width lies between lumen and pockets, and between neighbouring pockets; each pocket
+    stays within its own sector. Raises DesignError if the given radius is too small.
     """
     half = math.pi / design.chamber.count
     bond = design.bond.width
@@ -126,7 +127,7 @@ def axis_radius(design: LobedDesign, pockets: list[Region]) -> tuple[float, str 
 
 
 def footprint(design: LobedDesign) -> Footprint:
-    """Return lobes in a circle, joined by a hub round the lumen."""
+    """Return lobes on a circle, joined by a hub around the lumen."""
     pockets, shape_of = pocket_shapes(design, design.chamber)
     radius, note = axis_radius(design, pockets)
     count = design.chamber.count
@@ -153,9 +154,10 @@ def build(design: LobedDesign) -> Laminate:
 
 
 def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> float:
-    """One bond round the lumen; more if the chambers are farther out, to stay one piece.
+    """Return the hub radius: one bond around the lumen, or more to join chambers that are farther
+    out.
 
-    The hub then reaches every pocket's inner edge, and the middle between two neighbours.
+    The hub then reaches every pocket's inner edge, and the midpoint between two neighbours.
     """
     inward = min(-pocket.bounds[0] for pocket in pockets)
     return max(
@@ -166,9 +168,9 @@ def _hub_radius(design: LobedDesign, pockets: list[Region], axis: float) -> floa
 
 
 def _ears(axes: Sequence[Point]) -> list[tuple[Point, float]]:
-    """Start and angle of two film and two mask ears between the inlet tabs.
+    """Return start and angle of two film and two mask ears between the inlet tabs.
 
-    Up to four lobes have them on their flanks, 60 degrees off the tab; more lobes leave too little
+    Up to four lobes have them on their flanks, 60 degrees from the tab; more lobes leave too little
     room there, so the ears are midway between two lobes.
     """
     step = 360 / len(axes)

@@ -1,6 +1,6 @@
-"""Radial expansion: oblong balloons side by side on a sheet that is wrapped round a tube.
+"""Radial expansion: oblong balloons side by side on a sheet that wraps a tube.
 
-Laid flat for cutting: x runs round the tube, y along it (paper Sec. 2.1).
+Laid flat for cutting, x runs around the tube and y along it (paper Sec. 2.1).
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class OblongChamber(ChamberSection):
 
 
 class Tube(Section):
-    """Tube inside the wrapped sheet."""
+    """The tube inside the wrapped sheet."""
 
     outer_diameter: Length = 15.0
     """The tube that the sheet is wrapped round."""
@@ -100,7 +100,7 @@ class RadialStack(Stack):
 
 
 class RadialDesign(Design):
-    """Oblong SBAs bonded to one sheet that is wrapped round a tube."""
+    """Oblong SBAs bonded to one sheet that wraps a tube."""
 
     model_config = card(
         "On a tube",
@@ -121,12 +121,12 @@ class RadialDesign(Design):
 
     @property
     def pitch(self) -> float:
-        """Distance between neighbouring SBAs round the tube."""
+        """The distance between neighbouring SBAs around the tube."""
         return math.pi * self.tube.outer_diameter / self.chamber.count
 
     @property
     def pocket(self) -> tuple[float, float]:
-        """Width round the tube and length along it of an oblong pocket."""
+        """The width around the tube and the length along it of an oblong pocket."""
         bonds = 2 * self.bond.width
         return self.chamber.width - bonds, self.chamber.length - bonds
 
@@ -194,7 +194,7 @@ def build(design: RadialDesign) -> Laminate:
 
 
 def _slot(width: float, length: float) -> Region:
-    """A slot with round ends, along whichever side is the longer."""
+    """Return a slot with round ends, along its longer side."""
     slot = stadium((0.0, 0.0), min(width, length), max(width, length))
     return slot if width <= length else slot.turned(90)
 
@@ -217,10 +217,10 @@ def _check_pitch(design: RadialDesign, outline: Region) -> None:
     needed = high_x - low_x + 2 * design.mask.overhang + design.laser.least_feature
     if design.chamber.count > 1 and design.pitch < needed:
         raise DesignError(
-            f"chamber.count = {design.chamber.count} SBAs {high_x - low_x:g} wide do not fit round "
-            f"tube.outer_diameter = {design.tube.outer_diameter:g}: the pitch is "
-            f"{design.pitch:.3f} and must be at least {needed:.3f}; use fewer, narrower or a "
-            "thicker tube"
+            f"chamber.count = {design.chamber.count} SBAs {high_x - low_x:g} wide do not fit "
+            f"around tube.outer_diameter = {design.tube.outer_diameter:g}: the pitch is "
+            f"{design.pitch:.3f} and must be at least {needed:.3f}; use fewer or narrower SBAs, "
+            "or a thicker tube"
         )
 
 
@@ -236,8 +236,8 @@ def _window(design: RadialDesign, pocket: Region, outline: Region) -> Region:
     window = _slot(width, length)
     if not (window - outline).is_empty:
         raise DesignError(
-            f"window.width = {width:g} and window.length = {length:g} reach past the outline of "
-            "the SBA; make them smaller"
+            f"window.width = {width:g} and window.length = {length:g} exceed the outline of the "
+            "SBA; reduce them"
         )
     return window
 
@@ -289,7 +289,8 @@ def _ears(
     outline: Region,
     centres: tuple[Point, ...],
 ) -> tuple[Ear, ...]:
-    """Two film ears at the lower end of each SBA, two mask ears beside its tab, two of the sheet.
+    """Return two film ears at the lower end of each SBA, two mask ears beside its tab, and two of
+    the sheet.
 
     A manifold joins all SBAs into one part in the bottom balloon, but not above it.
     """
@@ -320,8 +321,9 @@ STEP = 0.25
 
 
 class _Feet:
-    """Starts of ears on an outline of any shape: two below, and two above beside its tab, which is
-    on the upper side at x = 0. A ``side`` is 1 above, -1 below.
+    """Starts of ears on an outline of any shape: two below, and two above beside its tab.
+
+    The tab is on the upper side at x = 0. A ``side`` is 1 above, -1 below.
     """
 
     def __init__(self, design: RadialDesign, outline: Region) -> None:
@@ -350,7 +352,7 @@ class _Feet:
     def of_masks(self) -> list[tuple[Point, Point | None]]:
         """Return starts of two mask ears, clear of the tab and the head of its tail.
 
-        Each comes with the point of the outline that it is joined from, if it starts beside it.
+        Each comes with the point of the outline to which it is joined, if it starts beside it.
         """
         beside = self.tab + 2 * self.overhang + self.half
         feet: list[tuple[Point, Point | None]] = []
@@ -381,8 +383,10 @@ class _Feet:
         return x, side * (end - min((end - start) / 2, 2 * self.half))
 
     def _nearest(self, preferred: float, side: int, clear_of: float | None = None) -> Point | None:
-        """The foot nearest to ``preferred`` with no other part of the outline ahead of it, or the
-        one with the least ahead. ``clear_of``: the x of another ear.
+        """Return the foot nearest to ``preferred`` with no other part of the outline ahead, or with
+        the least ahead.
+
+        ``clear_of`` is the x of another ear.
         """
         low_x, _, high_x, _ = self.outline.bounds
         reach = max(high_x, preferred) - min(low_x, preferred)
@@ -402,7 +406,7 @@ class _Feet:
         return best and best[1]
 
     def _ahead(self, start: Point, side: int) -> float:
-        """Reach of the outline past ``start`` in the way of an ear, mm."""
+        """Return the extent of the outline beyond ``start`` in the path of an ear, mm."""
         half = self.half + 2 * self.overhang
         _, low, _, high = self.outline.bounds
         band = self.outline & rectangle((start[0] - half, low - 1), (start[0] + half, high + 1))

@@ -1,6 +1,6 @@
 """Named shapes of a design file, and the regions that they enclose.
 
-Shapes may be made of others by name; several layers may use the same one.
+A shape may be composed of others by name; several layers may use the same shape.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ FURTHER: Mapping[str, tuple[str, ...]] = {"pattern": PATTERNS, "file": ("layer",
 
 
 class NamedShape(Section):
-    """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one made of others."""
+    """A shape: a disc, ring, slot, stadium, polygon, path or drawing, or one composed of others."""
 
     disc: Length | None = None
     """Diameter of a disc."""
@@ -132,22 +132,26 @@ class NamedShape(Section):
             raise ValueError(f"is a {kind} without {missing[0]}; add it")
         ways = [key for key in PATTERNS if key in keys]
         if kind == "pattern" and len(ways) != 1:
-            raise ValueError("is a pattern, which has either round or step; give one of the two")
+            raise ValueError(
+                "is a pattern with both round and step, or neither; give one of the two"
+            )
         for key in keys:
             allowed = (kind, *NEEDS[kind], *PLACING, *FURTHER.get(kind, ()))
             if key not in allowed:
                 raise ValueError(f"is a {kind}, which has no {key}; remove it")
         if self.ring is not None and self.ring[0] <= self.ring[1]:
-            raise ValueError("is a ring whose outer diameter, the first, must be the larger one")
+            raise ValueError(
+                "is a ring whose first diameter, the outer one, must be larger than the second"
+            )
         if self.stadium is not None and self.stadium[0] > self.stadium[1]:
             raise ValueError("is a stadium wider than it is long; swap the two and add turned = 90")
         if self.slot is not None and self.slot[0] == self.slot[1]:
-            raise ValueError("is a slot whose ends are one point; move one of them")
+            raise ValueError("is a slot with coincident ends; move one of them")
         return self
 
 
 class NamedShapes(NamedTables):
-    """The shapes by name, a table for each."""
+    """Shapes by name, one table each."""
 
     what, names = "shape", "[a-z][a-z0-9_-]{0,31}"
     names_are = "a small letter and up to 31 small letters, digits, - or _"
@@ -158,7 +162,7 @@ class ShapeRegions:
     """The shapes of a design as regions, each computed once."""
 
     def __init__(self, shapes: Mapping[str, NamedShape], files: Mapping[str, Path]) -> None:
-        """Shapes by name, and their drawings by key, such as ``shapes.rim.file``."""
+        """Take shapes by name, and their drawings by key, such as ``shapes.rim.file``."""
         self.shapes = shapes
         self.files = files
         self._regions: dict[str, Region] = {}
@@ -168,11 +172,11 @@ class ShapeRegions:
         """Return the shape of this name for its ``user``, a key. Raises DesignError."""
         if name not in self.shapes:
             raise DesignError(
-                f"{user} names a shape {shown(name)} that is not there; {hint(name, self.shapes)}"
+                f"{user} names a missing shape, {shown(name)}; {hint(name, self.shapes)}"
             )
         if name in self._open:
             raise DesignError(
-                f"shapes.{name} is made of itself, by way of {' and '.join(self._open)}; name "
+                f"shapes.{name} is defined by itself through {' and '.join(self._open)}; use "
                 "another shape"
             )
         if name not in self._regions:
@@ -182,7 +186,7 @@ class ShapeRegions:
             finally:
                 self._open.pop()
             if region.is_empty:
-                raise DesignError(f"shapes.{name} encloses no area; change its sizes")
+                raise DesignError(f"shapes.{name} encloses no area; change its dimensions")
             self._regions[name] = region
         return self._regions[name]
 
@@ -221,7 +225,7 @@ def _copies(name: str, region: Region, shape: Any) -> Region:
     count, about = shape.count, shape.round
     if len(region.edges) * count > MOST_EDGES:
         raise DesignError(
-            f"shapes.{name}.count = {count} makes more than {MOST_EDGES} edges; repeat less"
+            f"shapes.{name}.count = {count} gives more than {MOST_EDGES} edges; use fewer copies"
         )
     if about is not None:
         return union(region.turned(360 * i / count, about) for i in range(count))
@@ -257,7 +261,7 @@ def _simple_loop(key: str, vertices: Sequence[Mark]) -> Polyline:
     """Return the closed loop through x, y and bulge of each corner. Raises DesignError."""
     corners = [(x, y) for x, y, _ in vertices]
     if any(start == end for start, end in pairwise([*corners, corners[0]])):
-        raise DesignError(f"{key} has one corner twice in a row; remove one")
+        raise DesignError(f"{key} repeats a corner; remove one")
     loop = polyline(vertices, closed=True)
     try:
         refuse_crossings(loop)

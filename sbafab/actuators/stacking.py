@@ -1,4 +1,4 @@
-"""Stacks of balloons as layers, and the pockets, tabs and strips common to all families."""
+"""Stacks of balloons as layers, and the pockets, tabs and strips of all families."""
 
 from __future__ import annotations
 
@@ -64,8 +64,8 @@ class BalloonShape:
 class BalloonStack:
     """Balloons bottom to top, their channels, and their registration.
 
-    ``shapes`` holds the distinct balloons and ``shape_of`` the index of each balloon's own;
-    ``bottom`` is the first balloon with its inlet tabs and strips. ``axes`` are the channel axes.
+    ``shapes`` holds the distinct balloons and ``shape_of`` each balloon's index in it; ``bottom``
+    is the first balloon with its inlet tabs and strips. ``axes`` are the channel axes.
     """
 
     bottom: BalloonShape
@@ -122,9 +122,10 @@ def balloon_cuts(stack: BalloonStack, design: Design) -> list[CutFilm]:
 
     @cache
     def separator_mask(below: frozenset[int], above: int) -> Region:
-        """The mask under a balloon: it covers the contact with every balloon of ``below``.
+        """Return the mask under a balloon, which covers the contact with every balloon of
+        ``below``.
 
-        Beyond a smaller neighbour a film would meet the next but one, or the inlet tabs.
+        Beyond a smaller neighbour a film would otherwise meet the next but one, or the inlet tabs.
         """
         shared = eared(above)
         # The bottom balloon covers a plain one of its size.
@@ -164,7 +165,7 @@ def channel_pin(name: str, centre: Point, bore: BoreSection) -> Pin:
 def film_of(design: Design, role: Role, index: int = 0) -> Film:
     """Return the film of a role in a design, or of the layer with this index.
 
-    Raises DesignError if it names none, or one of the wrong kind.
+    Raises DesignError if there is none, or if it is of the wrong kind.
     """
     key = f"layup.{role.replace('-', '_')}"
     name: str = getattr(design.layup, role.replace("-", "_"))
@@ -175,13 +176,12 @@ def film_of(design: Design, role: Role, index: int = 0) -> Film:
     fit = [name_of_film for name_of_film, film in stock.items() if film.kind == kind]
     if name not in stock:
         raise DesignError(
-            f"{key} = {shown(name)} names no film; there are {listed(fit)} for it, and "
-            "[films.NAME] adds one"
+            f"{key} = {shown(name)} is not a film; use {listed(fit)}, or add it as [films.NAME]"
         )
     if name not in fit:
         raise DesignError(
-            f"{key} = {shown(name)} is a {stock[name].kind} film, and a {role} is cut from a "
-            f"{kind} one: {listed(fit)}"
+            f"{key} = {shown(name)} is a {stock[name].kind} film, but a {role} needs a {kind} "
+            f"film: {listed(fit)}"
         )
     return stock[name]
 
@@ -250,7 +250,7 @@ def stacked(
 
 
 def of_every_family(design: Design) -> dict[str, Any]:
-    """Return what a laminate has from sections that all families share."""
+    """Return the facts of a laminate from sections that all families share."""
     return {
         "name": design.name,
         "family": design.family,
@@ -278,7 +278,7 @@ class RoundChamber(ChamberSection):
 def free_of_round(chamber: RoundChamber, further: tuple[Free, ...]) -> tuple[Free, ...]:
     """Return the search variables of a round chamber, followed by ``further`` ones.
 
-    The diameter is that of all balloons, or the largest of a list, which fixes their number.
+    The diameter is that of all balloons, or the largest of a list, whose length is fixed.
     """
     if chamber.outline is not None:
         return further
@@ -296,7 +296,7 @@ def diameters(design: Design, chamber: RoundChamber) -> tuple[float, ...]:
     if len(chamber.diameter) != design.stack.balloons:
         raise DesignError(
             f"chamber.diameter lists {len(chamber.diameter)} balloons but stack.balloons = "
-            f"{design.stack.balloons}; give one diameter a balloon, bottom to top"
+            f"{design.stack.balloons}; give one diameter per balloon, bottom to top"
         )
     return chamber.diameter
 
@@ -307,7 +307,7 @@ def round_pockets(design: Design, chamber: RoundChamber) -> Discs | Drawn:
 
 
 def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], tuple[int, ...]]:
-    """Return the distinct pockets round (0, 0), and the index of each balloon's.
+    """Return the distinct pockets around (0, 0), and the index of each balloon's.
 
     Raises DesignError if a pocket has no room for bore and neck ring.
     """
@@ -323,8 +323,8 @@ def pocket_shapes(design: Design, chamber: RoundChamber) -> tuple[list[Region], 
     distinct = list(dict.fromkeys(sizes))
     if len(distinct) > MOST_SIZES:
         raise DesignError(
-            f"chamber.diameter lists {len(distinct)} different diameters, where at most "
-            f"{MOST_SIZES} are allowed; let neighbouring balloons share one"
+            f"chamber.diameter lists {len(distinct)} different diameters; the limit is "
+            f"{MOST_SIZES}; use equal diameters for neighbouring balloons"
         )
     pockets = [disc((0.0, 0.0), size / 2) for size in distinct]
     check_neck(design, pockets)
@@ -343,8 +343,8 @@ def check_neck(design: Design, pockets: list[Region]) -> None:
         remedy += f", or make the bore less than {largest:.3f}" if largest > 0 else ""
         raise DesignError(
             f"bore.diameter = {design.bore.diameter:g} with a neck ring of bond.width = "
-            f"{design.bond.width:g} round it (outer radius {ring:.3f}) does not fit a pocket that "
-            f"leaves {room:.3f} round the channel; {remedy}"
+            f"{design.bond.width:g} around it (outer radius {ring:.3f}) does not fit a pocket "
+            f"that leaves {room:.3f} around the channel; {remedy}"
         )
 
 
@@ -366,7 +366,7 @@ def tab_and_strip(
         if not pocket.contains(corner):
             raise DesignError(
                 f"inlet.width = {width:g} is wider than the pocket of {chamber} where the strip "
-                "leaves it; make inlet.width smaller or the chamber larger"
+                "leaves it; reduce inlet.width or enlarge the chamber"
             )
     length = edge + design.inlet.tab_length
 
@@ -387,7 +387,7 @@ def tab_and_strip(
 
 
 def bonded(pockets: Region, width: float) -> Region:
-    """Return the outline of pockets with a bonded ring round them; filled inside."""
+    """Return the outline of pockets with a bonded ring around them, filled inside."""
     return Region(grow(pockets, width).outers)
 
 
@@ -406,11 +406,11 @@ EARS: tuple[tuple[str, Holder], ...] = (
 class Footprint:
     """Balloons in one piece seen from above, mm.
 
-    ``pockets`` holds one pocket per chamber for each distinct balloon, and ``shape_of`` the index
-    of each balloon's own, bottom to top. Chambers have ``axes``, and inlets that run from these
-    along unit ``directions``; without its tab the film ends ``edge`` mm from the axis. ``hub``
-    joins the lobes of several chambers. ``lumen`` and ``lumen_pin`` are diameters. ``ears`` are
-    start and angle (degrees) of two film ears and two mask ears.
+    ``pockets`` holds one pocket per chamber for each distinct balloon, and ``shape_of`` each
+    balloon's index in it, bottom to top. Chambers have ``axes``, and inlets run from these along
+    unit ``directions``; without its tab the film ends ``edge`` mm from the axis. ``hub`` joins the
+    lobes of several chambers. ``lumen`` and ``lumen_pin`` are diameters. ``ears`` are start and
+    angle (degrees) of two film ears and two mask ears.
     """
 
     pockets: Sequence[Sequence[Region]]
@@ -467,7 +467,7 @@ def build_footprint(design: Design, footprint: Footprint) -> Laminate:
 
 
 def _plate(design: Design, hub: Region | None, pockets: Sequence[Region]) -> BalloonShape:
-    """A balloon without its inlets; lobes are joined by the hub, their corners filleted."""
+    """Return a balloon without its inlets; the hub joins its lobes, with filleted corners."""
     lobes = [bonded(pocket, design.bond.width) for pocket in pockets]
     if hub is None:
         return BalloonShape(lobes[0], pockets[0], 1, 1)
@@ -476,7 +476,7 @@ def _plate(design: Design, hub: Region | None, pockets: Sequence[Region]) -> Bal
 
 
 def _rays(footprint: Footprint, design: Design) -> list[Ray]:
-    """Rays of the ears; a single balloon has no separator mask to hold."""
+    """Return the rays of the ears; a single balloon has no separator mask to hold."""
     return [
         Ray(name, holder, start, unit(angle), name.endswith("2"))
         for (name, holder), (start, angle) in zip(EARS, footprint.ears, strict=True)
@@ -487,7 +487,7 @@ def _rays(footprint: Footprint, design: Design) -> list[Ray]:
 def _check_tabs(
     design: Design, outlines: Sequence[Region], feeds: Sequence[tuple[Region, Region, Inlet]]
 ) -> None:
-    """Raises DesignError if a tab is nearer than one overhang to another lobe or tab."""
+    """Raise DesignError if a tab is closer than one overhang to another lobe or tab."""
     for (tab, _, inlet), outline in zip(feeds, outlines, strict=True):
         free = grow(tab - outline, design.mask.overhang) if len(feeds) > 1 else Region()
         for other, (other_tab, _, neighbour) in zip(outlines, feeds, strict=True):

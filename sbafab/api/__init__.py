@@ -4,7 +4,7 @@
 >>> laminate = sbafab.build("3dof-15mm", stack={"balloons": 6})
 >>> run = sbafab.generate("3dof-15mm", out="out")
 
-A design is given as a template's name, a TOML file, or a ``Design``. Keys are changed by texts,
+A design is given as a template's name, a TOML file, or a ``Design``. Keys are changed by text,
 ``"stack.balloons=6"``, by dicts, ``{"stack.balloons": 6}``, or by keywords, ``stack={"balloons":
 6}``. Bad input raises ``sbafab.DesignError``, a folder that cannot be written
 ``sbafab.errors.OutputError``, each with one sentence.

@@ -35,7 +35,7 @@ PAIR = Field(min_length=2, max_length=2)
 
 
 class NamedPort(Document):
-    """A port of a netlist, with its place if it is none of the design's."""
+    """A port of a netlist, with its position if it is not a port of the design."""
 
     name: str
     at: Annotated[Sequence[float], PAIR] = ()
@@ -58,9 +58,9 @@ def check(
 ) -> Findings:
     """Check a design with the rule deck; an assembly also between its parts.
 
-    Each finding has its limit and worst measured value in its own ``unit``. ``progress`` is called
-    with each rule; an exception from it ends the check. Raises DesignError if the design cannot be
-    built. Limits are the paper's (Sec. 2) if it gives one, else ours.
+    Each finding has its limit and worst measured value in its ``unit``. ``progress`` is called with
+    each rule; an exception in it stops the check. Raises DesignError if the design cannot be built.
+    Limits are the paper's (Sec. 2) if it gives one, else ours.
     """
     # A job takes models, hence numpy; a page without numpy has the rules of a design.
 
@@ -72,9 +72,9 @@ def checking(
 ) -> Iterator[tuple[str, Findings]]:
     """Yield every rule's name and its findings in a design, as they are measured.
 
-    Iteration may stop at any rule; registration-yield, which draws builds, comes last.
-    ``laminate`` is the design's, if already built; ``pause`` is called between parts of long
-    rules, and an exception from it ends the deck. Raises DesignError.
+    Iteration may stop at any rule; registration-yield, which samples builds, comes last.
+    ``laminate`` is the design's, if already built; ``pause`` is called between parts of long rules,
+    and an exception in it stops the deck. Raises DesignError.
     """
     design = load(source)
     measures = Measures(laminate or build(design), design, pause or (lambda: None))

@@ -52,8 +52,8 @@ Returned = TypeVar("Returned")
 def command(function: Callable[Arguments, Returned]) -> Callable[Arguments, Returned]:
     """Return a command's function that also accepts tables of a design as keywords.
 
-    NumPy numbers and arrays become Python's. Raises DesignError for a misspelt keyword, with the
-    most similar argument.
+    NumPy numbers and arrays are converted to Python's. Raises DesignError for a misspelt keyword,
+    with the most similar argument.
     """
     arguments = list(signature(function).parameters)
 
@@ -76,7 +76,7 @@ def command(function: Callable[Arguments, Returned]) -> Callable[Arguments, Retu
 
 
 def numbers(name: str, values: float | Sequence[float]) -> tuple[float, ...]:
-    """Return one number or several as a tuple. Raises DesignError."""
+    """Return one or several numbers as a tuple. Raises DesignError."""
     try:
         return tuple(map(float, values if isinstance(values, Sequence) else [values]))
     except (TypeError, ValueError):
@@ -84,7 +84,7 @@ def numbers(name: str, values: float | Sequence[float]) -> tuple[float, ...]:
 
 
 def design_of(source: Source, changes: Sequence[Change], waivers: Sequence[str] = ()) -> Design:
-    """Return the design with its keys changed, of a file also with more waivers.
+    """Return the design with its keys changed, for a file also with additional waivers.
 
     Raises DesignError.
     """
@@ -96,7 +96,7 @@ def design_of(source: Source, changes: Sequence[Change], waivers: Sequence[str] 
 def either_of(
     source: Source | Assembly, changes: Sequence[Change], waivers: Sequence[str] = ()
 ) -> Design | Assembly:
-    """Return the design, as ``design_of`` does, or the assembly. Raises DesignError."""
+    """Return the design, like ``design_of``, or the assembly. Raises DesignError."""
     if isinstance(source, Assembly):
         return source
     if isinstance(source, Design):
@@ -105,12 +105,12 @@ def either_of(
 
 
 def templates() -> list[str]:
-    """Return the names of the designs and assemblies that ship, in alphabetical order."""
+    """Return the names of the bundled designs and assemblies, in alphabetical order."""
     return template_names()
 
 
 def template(name: str) -> str:
-    """Return the text (TOML) of a design that ships. Raises DesignError for another name."""
+    """Return the text (TOML) of a bundled design. Raises DesignError for another name."""
     return template_text(name)
 
 
@@ -204,7 +204,7 @@ def load(source: Source, *changes: Change, **tables: Any) -> Design:
 def loads(text: str, path: str | Path = "design.toml") -> Design | Assembly:
     """Return a design or an assembly from the text of a file. Raises DesignError.
 
-    Relative paths in it start beside ``path``.
+    Relative paths in it are based on the folder of ``path``.
     """
     return load_text(text, Path(path))
 
@@ -217,17 +217,17 @@ def resolved(design: Design | Assembly) -> dict[str, Any]:
 def build(source: Source, *changes: Change, **tables: Any) -> Laminate:
     """Return the laminate of a design: its layers bottom to top, lengths in mm, the axis at (0, 0).
 
-    Notebooks display it as a picture. Raises DesignError. The lay-up is the paper's
-    (Sec. 2).
+    Notebooks display it as a picture. Raises DesignError. The lay-up follows the paper (Sec. 2).
     """
     return actuators.build(load(source, *changes, **tables))
 
 
 def assemble(source: str | Path | Assembly, *changes: Change, **tables: Any) -> Assembled:
-    """An assembly from a template's name, a TOML file or its record: parts, designs and places.
+    """Return an assembly from a template's name, a TOML file or its record: parts, designs and
+    places.
 
-    Places are mm and degrees in the root part's frame. Raises DesignError
-    if a part cannot sit where it should. The templates are the paper's (Sec. 2.1).
+    Places are in mm and degrees in the root part's frame. Raises DesignError if a part cannot be
+    placed as required. The templates are the paper's (Sec. 2.1).
     """
     if isinstance(source, Assembly):
         return put_together(source)
@@ -238,7 +238,7 @@ def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: An
     """Return the closed surface of the flat actuator in mm, as for ``solid(...).trimesh()``.
 
     Films have their nominal thickness, pockets their mask's thickness. For an assembly's part it is
-    the outside, in the part's own frame and bent round its tube; ``part.pose`` places it. Raises
+    the outside, in the part's frame and bent around its tube; ``part.pose`` places it. Raises
     DesignError.
     """
     if isinstance(source, PlacedPart):
@@ -250,7 +250,7 @@ def solid(source: Source | Laminate | PlacedPart, *changes: Change, **tables: An
 def drawing(layer: Layer) -> Drawing:
     """Return a layer as an ezdxf document in mm: nominal edges as in its cut file, without kerf.
 
-    It is DXF R2010: a closed LWPOLYLINE with bulges a contour, CIRCLE for a full circle.
+    It is DXF R2010: a closed LWPOLYLINE with bulges for each contour, or a CIRCLE.
     """
     from ezdxf.filemanagement import read
 

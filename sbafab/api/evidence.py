@@ -1,4 +1,4 @@
-"""What others and the lab measured, beside the models and fitted by them."""
+"""Measurements by others and the lab, compared with the models and used to fit them."""
 
 from __future__ import annotations
 

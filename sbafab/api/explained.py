@@ -47,7 +47,7 @@ TERMS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class DesignKey:
-    """A key of design files, as one or several families have it; texts as a person reads them."""
+    """A key of design files, of one or several families, as text for readers."""
 
     key: str
     meaning: str
@@ -57,7 +57,7 @@ class DesignKey:
 
 
 class ExplainDocument(Document, schema="sbafab/explain@1"):
-    """Output of ``explain NAME --json``: a rule, keys, quantities or a term."""
+    """The output of ``explain NAME --json``: a rule, keys, quantities or a term."""
 
     rule: str = ""
     holds: str = ""
@@ -70,7 +70,7 @@ class ExplainDocument(Document, schema="sbafab/explain@1"):
 
 
 class ExplainedDocument(Document, schema="sbafab/explained@1"):
-    """Output of ``explain --json``: all rules."""
+    """The output of ``explain --json``: all rules."""
 
     rules: dict[str, Explanation]
 
@@ -102,7 +102,7 @@ def explainable_names() -> list[str]:
 def design_keys(document: JsonSchema | None = None) -> list[DesignKey]:
     """Return every key of design files from their JSON schema, in the order of the file.
 
-    A key that two families have alike stands once, with both names.
+    A key that is equal in two families is listed once, with both names.
     """
     document = document or schema()
     families: dict[DesignKey, list[str]] = {}

@@ -31,8 +31,8 @@ MAP = ("balloon", "pressure_kpa", "height_mm", "force_mn", "volume_ul", "potenti
 
 
 def map_text(balloons: Sequence[BalloonMap], points: int) -> str:
-    """Return balloons as CSV, at so many pressures, closer together where they are
-    low, and heights; by a balloon computed at each place, without rows where the map does not hold.
+    """Return balloons as CSV, on a grid of pressures (closer together at low pressure) and heights,
+    from a balloon computed at each place. Rows are omitted where the map is invalid.
     """
     rows: list[Sequence[str]] = [MAP]
     even = np.linspace(0.0, 1.0, points)

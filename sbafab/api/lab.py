@@ -44,13 +44,13 @@ from sbafab.reports.traveller.record_sheet import RecordTable
 def kerf(
     measurements: str | Path, resolution: float | None = None, instrument: str = ""
 ) -> Calibration:
-    """The kerf in mm from a filled ``coupon.csv``, over all and along x and y.
+    """Return the kerf in mm from a filled ``coupon.csv``, over all and along x and y.
 
-    ``instrument`` is "calliper", "scanner" or "microscope" if the table has no column of that
-    name; ``resolution`` mm is its least step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A
-    constant reading error and a scale are fitted with the kerf. Uncertainties follow the usual
-    guide to their expression (JCGM 100:2008), intervals hold 95 %. Raises DesignError for an
-    ambiguous table, for a slip in it, and for an implausible kerf.
+    ``instrument`` is "calliper", "scanner" or "microscope" if the table has no column of that name;
+    ``resolution`` mm is its smallest step, by default 0.01, 0.0106 (2400 dpi) or 0.001. A constant
+    reading error and a scale are fitted with the kerf. Uncertainties follow the Guide to the
+    Expression of Uncertainty in Measurement (JCGM 100:2008); intervals are 95 %. Raises DesignError
+    for an ambiguous table, an erroneous entry in it, and an implausible kerf.
     """
     return calibrated(read_measurements(Path(measurements), instrument), resolution)
 
@@ -68,13 +68,13 @@ def record(
 
     ``values`` holds ``serial``, ``leak`` ("pass" or "fail"), ``operator``, ``kit``, ``note``, and
     the measurements: ``proof_kpa``, ``burst_kpa``, ``stroke_mm``, ``force_n``, ``height_mm``,
-    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``. It may also hold tables
-    of the design. For a batch, pass a ``table`` (CSV) instead. ``again`` records new attempts of
-    actuators that were repaired and tested again. Raises DesignError, OutputError.
+    ``mass_g``, one or several of ``offset_mm``, ``turn_deg``, ``cut_mm``. It may also contain
+    tables of the design. For a batch, pass a ``table`` (CSV) instead. ``again`` records new
+    attempts of actuators that were repaired and tested again. Raises DesignError, OutputError.
     """
     result = {name: values.pop(name) for name in columns(Record) if name in values}
     if table is not None and result:
-        raise DesignError(f"a table says it all; leave out {', '.join(result)}")
+        raise DesignError(f"a table contains all values; omit {', '.join(result)}")
     rows = [row_of(Record, result)] if table is None else recording.read_batch(Path(table))
     built = recording.built_from(source, [*changes, values] if values else changes)
     return recording.record(Lab(Path(lab)), built, rows, again)
@@ -89,7 +89,7 @@ def record_history(
 ) -> list[HistoryEntry]:
     """Record lines of the history of devices in the lab's file; return the entries added.
 
-    An entry has ``serial`` (several with commas between them) and ``date``, ``step``, ``item``,
+    An entry has ``serial`` (several, separated by commas) and ``date``, ``step``, ``item``,
     ``lot``, ``expires``, ``kerf_mm``, ``temperature_c``, ``press_force_n``, ``minutes``,
     ``decision``, ``reason``, ``photograph`` (a file, or its bytes), ``note``, ``initials``, as far
     as they are known. Raises DesignError, OutputError.
@@ -115,10 +115,10 @@ def record_sheet(source: Source, *changes: Change) -> list[RecordTable]:
 
 
 def report(lab: str | Path = "lab.sqlite") -> Report:
-    """Evaluate all records of a lab's file: success, figures, tolerances.
+    """Evaluate all records of a lab's file: success rates, figures, tolerances.
 
-    Units are in the names and in ``unit``; shares come with their 95 % interval. Raises
-    OutputError if the file cannot be read.
+    Units are in the names and in ``unit``; shares have a 95 % interval. Raises OutputError if the
+    file cannot be read.
     """
     records, _, builds = Lab(Path(lab)).contents()
     return report_of(records, builds)

@@ -70,16 +70,15 @@ def predict(
     """Predict the behaviour of a design; each figure has a unit, a model and a level of trust.
 
     Forces and works are at ``pressures_kpa`` (gauge; by default 10 and 100, or -10 and -100 for a
-    design that works under a vacuum), times at ``flow_ml_min`` into each chamber, strokes
-    with ``volumes_ul`` in each balloon. ``quick`` leaves out the curves and the figures of the
-    elastic stack, which take seconds; ``laminate`` is the design's, if already built.
-    ``tip_load`` g stand on the free tip. Values that were ``measured`` on an actuator, such as
-    "stroke@10kPa=16.6mm", narrow the prediction to that one, and so do the force and height that
-    the records of a ``lab`` hold of a ``serial``.
-    ``tables`` override tables of the design, such as
-    ``models={"calibration": "none"}``. Figures of calibrated models have a 90 % ``interval``.
-    Raises DesignError if a request is outside every model's range. Models: the paper's Eqs. 1-4
-    (Sec. 3), and elastic balloons of axisymmetric film in equilibrium.
+    design that works under vacuum), times at ``flow_ml_min`` into each chamber, strokes with
+    ``volumes_ul`` in each balloon. ``quick`` omits the curves and the figures of the elastic stack,
+    which take seconds; ``laminate`` is the design's, if already built. ``tip_load`` is the mass in
+    g on the free tip. Values ``measured`` on an actuator, such as "stroke@10kPa=16.6mm", narrow the
+    prediction to that actuator, as do the force and height of a ``serial`` in the records of a
+    ``lab``. ``tables`` override tables of the design, such as ``models={"calibration": "none"}``.
+    Figures of calibrated models have a 90 % ``interval``. Raises DesignError if a request is
+    outside every model's range. Models: the paper's Eqs. 1-4 (Sec. 3), and elastic balloons of
+    axisymmetric film in equilibrium.
     """
     design = load(source, *changes, **tables)
     usual = usual_pressures(design.form)
@@ -96,10 +95,10 @@ def predict(
 
 
 def _recorded(serial: str, lab: str | Path) -> list[str]:
-    """Return what the lab's records hold of an actuator, as ``measured`` of ``predict``: its
-    blocked force, flat at 100 kPa, and its folded height. A stroke has no pressure there.
+    """Return the lab's records of an actuator, as ``measured`` of ``predict``: its blocked force,
+    flat at 100 kPa, and its folded height.
 
-    Raises DesignError if they hold neither.
+    A recorded stroke has no pressure. Raises DesignError if there is neither.
     """
     texts = {"force_n": "force@0mm@100kPa={:g}N", "height_mm": "height={:g}mm"}
     records, _, builds = Lab(Path(lab)).contents()
@@ -112,7 +111,7 @@ def _recorded(serial: str, lab: str | Path) -> list[str]:
     ]
     if not found:
         raise DesignError(
-            f"{lab} has no force and no height of {serial}; record one, such as sbafab record "
+            f"{lab} has neither force nor height of {serial}; record one, such as sbafab record "
             f"DESIGN --serial {serial} --force 4.8"
         )
     return found
@@ -129,9 +128,10 @@ def predict_assembly(
 ) -> AssemblyPrediction:
     """Predict the inflated parts of an assembly: reach, load, grip, and contacts.
 
-    All actuators are at ``pressure_kpa``, and ``load_g`` g hangs across their tips; the paper's
-    marble by default (Sec. 5). ``pause`` is called between parts of the work, which takes seconds;
-    an exception from it ends the work. Raises DesignError for pressures beyond the models' range.
+    All actuators are at ``pressure_kpa``, and ``load_g`` is the mass in g carried by their tips, by
+    default the paper's marble (Sec. 5). ``pause`` is called between parts of the work, which takes
+    seconds; an exception in it stops the work. Raises DesignError for pressures beyond the models'
+    range.
     """
     assembled = source if isinstance(source, Assembled) else assemble(source, *changes, **tables)
     return predict_assembled(assembled, pressure_kpa, load_g, pause or (lambda: None))
@@ -140,13 +140,13 @@ def predict_assembly(
 def grip(assembled: Assembled, part: str) -> tuple[Grip, Surface] | None:
     """Return the grip of a radial part of an assembly and its inflated balloons; None for others.
 
-    The surface is in mm in the part's own frame, as high as the lumen leaves room, free without
-    one: lenses of two arcs of film that does not stretch (as for the paper's Sec. 5). Raises
-    DesignError if the assembly does not have the part.
+    The surface is in mm in the part's frame, as high as the lumen allows, or free: lenses of two
+    arcs of inextensible film (as for the paper's Sec. 5). Raises DesignError if the assembly does
+    not have the part.
     """
     names = [placed.name for placed in assembled.parts]
     if part not in names:
-        raise DesignError(f"no part is named {part!r}; there are {', '.join(names)}")
+        raise DesignError(f"there is no part {part!r}; use {', '.join(names)}")
     placed = assembled[part]
     outcome = grip_of(assembled, placed) if isinstance(placed, PlacedSba) else None
     if outcome is None or not isinstance(placed, PlacedSba):
@@ -162,11 +162,11 @@ def stack(
     most_pressure: float = MOST_PRESSURE,
     **tables: Any,
 ) -> Stack:
-    """The actuator as plates joined by balloons, for poses in real time: ``stack.pose((5, 5, 0))``.
+    """Return the actuator as plates joined by balloons; ``stack.pose((5, 5, 0))`` is in real time.
 
-    ``most_pressure`` kPa is the largest pressure of any pose: for ``stack.pose((300, 300, 300))``
-    make it with ``most_pressure=300``; ``tables`` override tables of the design. Balloons lengthen
-    and tilt but do not carry shear (paper, Sec. 4.4). Raises DesignError for pockets that are not
+    ``most_pressure`` in kPa is the highest pressure of any pose: use ``most_pressure=300`` for
+    ``stack.pose((300, 300, 300))``; ``tables`` override tables of the design. Balloons lengthen and
+    tilt but do not carry shear (paper, Sec. 4.4). Raises DesignError for pockets that are not
     round.
     """
     design = load(source, *changes, **tables)
@@ -190,10 +190,10 @@ def motion(
     ``motion.step(dt, flows=...)`` with flows (ul/s) of the pumps.
 
     ``length`` and inner ``diameter`` of each chamber's tube are mm (the default is the paper's
-    tube, Sec. 2); ``fluid`` is air or water; ``dead_volume`` are ul between pump and tube
-    (syringe, valve, fittings), ``delay`` s until they act; ``pressures`` (kPa, by default 0) are
-    the initial ones; ``load`` holds the arguments of ``stack.pose`` other than pressures. Flow is
-    laminar (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
+    tube, Sec. 2); ``fluid`` is air or water; ``dead_volume`` are ul between pump and tube (syringe,
+    valve, fittings), ``delay`` s until they act; ``pressures`` (kPa, by default 0) are the initial
+    ones; ``load`` holds the arguments of ``stack.pose`` other than pressures. Flow is laminar
+    (Poiseuille) or turbulent (Blasius), air isothermal. Raises DesignError.
     """
     if fluid not in FLUIDS:
         raise DesignError(f'fluid = "{fluid}" must be one of {", ".join(sorted(FLUIDS))}')

@@ -1,4 +1,4 @@
-"""Files of a design: everything, or one part of it; simulators that read them."""
+"""Files of a design: all or one part of them; and the simulators that read them."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from sbafab.simulators.simulator import CHOICES, NAMES, Result, SimulationReques
 
 
 class RunDocument(Document, schema="sbafab/run@1"):
-    """Output of a command that writes a folder."""
+    """The output of a command that writes a folder."""
 
     folder: Path
     failed: bool
@@ -50,7 +50,7 @@ class NestedDesign(Document):
 
 
 class NestedDocument(Document, schema="sbafab/nested@1"):
-    """Output of ``nest --json``."""
+    """The output of ``nest --json``."""
 
     folder: Path
     failed: bool
@@ -70,8 +70,8 @@ def import_design(source: str | Path, out: str | Path | None = None) -> Design:
 
     ``source`` is any source that ``sbafab import`` reads; ``out`` is the design file to write, by
     default its name in this folder, with drawings in a folder beside it. A ``UserWarning`` names
-    each place that is not carried over. Raises DesignError if the source cannot be imported,
-    OutputError if a file is in the way.
+    each item that is not imported. Raises DesignError if the source cannot be imported, OutputError
+    if a file is in the way.
     """
     # Its formats load by name: a run imports nothing.
     import_to = plugins.load("sbafab.importing.sources:import_to")
@@ -93,18 +93,17 @@ def generate(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
-    """Writes everything into ``out/<name>/``; the run tells whether a rule failed.
+    """Write everything into ``out/<name>/``; the run tells whether a rule failed.
 
-    ``decks`` adds what the simulators read; ``dxf_profile`` and ``chord_error`` mm are as in
-    ``cut``.
-    ``progress`` is called with each step; an exception from it ends the run and leaves the old
+    ``decks`` adds the simulators' input; ``dxf_profile`` and ``chord_error`` mm are as in ``cut``.
+    ``progress`` is called with each step; an exception in it stops the run and leaves the old
     folder intact. Raises DesignError, OutputError if the folder cannot be written or belongs to
     another design, and DefectError if the written files differ from the checked design.
     """
     either = either_of(source, [*changes, tables])
     if decks and isinstance(either, Assembly):
         raise DesignError(
-            f"decks are of one design, and {either.name} is an assembly; leave them out"
+            f"decks need a single design, but {either.name} is an assembly; omit them"
         )
     parts = (*EVERYTHING, *NAMES) if decks else EVERYTHING
     return run(RunRequest(either, Path(out), parts, Curves(dxf_profile, chord_error)), progress)
@@ -120,7 +119,7 @@ def cut(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
-    """Writes the cut files and film sheets, DXF R2010 in mm.
+    """Write the cut files and film sheets, DXF R2010 in mm.
 
     ``dxf_profile`` is "bulges", "arcs" (LINE, ARC, CIRCLE) or "chords"; ``chord_error`` mm applies
     to the last. ``progress`` is called with each step, as in ``generate``. Raises DesignError,
@@ -139,10 +138,10 @@ def press(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
-    """Writes the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
+    """Write the heat-press schedule, ``press.json`` and ``press.csv``; in C, kPa, N, mm and min.
 
-    The steps are the paper's (Sec. 2). Raises DesignError if temperature, pad or pins do not
-    suit the laminate, and OutputError.
+    The steps follow the paper (Sec. 2). Raises DesignError if temperature, pad or pins do not suit
+    the laminate, and OutputError.
     """
     return run(RunRequest(load(source, *changes, **tables), Path(out), ("press",)), progress)
 
@@ -162,7 +161,7 @@ def mesh(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Run:
-    """Writes solid, cavities and conforming meshes; the run's ``conforming`` lists the latter.
+    """Write solid, cavities and conforming meshes; the run's ``conforming`` lists the latter.
 
     ``formats`` are any of "vtu", "vtk", "msh", "inp" and "stl". ``h`` mm and the
     arguments after it are the fields of ``MeshSettings``; ``tables`` override tables of the design.
@@ -183,9 +182,9 @@ def nest(
     chord_error: float = TRUE_ARCS.chord_error,
     progress: Progress | None = None,
 ) -> Run:
-    """Writes several designs into ``out/<name>/``, cut from the same film sheets.
+    """Write several designs into ``out/<name>/``, cut from the same film sheets.
 
-    Their films, sheets and kerf must be alike; ``dxf_profile`` and ``chord_error`` mm are as in
+    Their films, sheets and kerf must be equal; ``dxf_profile`` and ``chord_error`` mm are as in
     ``cut``. Raises DesignError, OutputError and DefectError.
     """
     designs, curves = [load(source) for source in sources], Curves(dxf_profile, chord_error)
@@ -211,7 +210,7 @@ def simulate(
     progress: Progress | None = None,
     **tables: Any,
 ) -> Simulated:
-    """Runs an installed simulator and writes to ``out/<name>/<simulator>/``.
+    """Run an installed simulator and write to ``out/<name>/<simulator>/``.
 
     ``simulator`` is "calculix", "sofa" or "mujoco"; ``export`` writes its input and does not run
     it. ``pressure`` kPa (a vacuum is negative), ``chambers`` kPa by name and the arguments after

@@ -1,4 +1,4 @@
-"""Designs found, swept, compared, or changed for a yield."""
+"""Search, sweep and comparison of designs, and changes for a yield."""
 
 from __future__ import annotations
 
@@ -50,11 +50,12 @@ def find(
     sure: float | None = None,
     **tables: Any,
 ) -> FoundDesign:
-    """The design that meets the requirements and is best by one quantity, or the nearest miss.
+    """Return the design that meets the requirements and is best in one quantity, or the nearest
+    miss.
 
     ``find("3dof-15mm", least={"lumen": 3, "force@12.5mm@50kPa": 3}, most={"outline_diameter":
     20})``: ``least`` and ``most`` are in mm, degrees, N, N/mm, s, g and kPa, or texts with a unit;
-    a ``time`` is with water at ``flow_ml_min``. ``free`` are the keys to vary in place of the
+    a ``time`` is for water at ``flow_ml_min``. ``free`` are the keys to vary instead of the
     family's own, as texts ``["chamber.diameter=8:12:0.1", "stack.balloons=6:9:1"]``, mm. The other
     arguments are the fields of ``FindRequest``, such as ``sure``, the probability (a share) of
     meeting each requirement; ``tables`` override tables of the design. ``found.best.values`` are
@@ -75,13 +76,13 @@ def _texts(limits: Limits) -> list[str]:
 
 @command
 def reach_yield(source: Source, *changes: Change, target: float, **tables: Any) -> YieldDesign:
-    """The design with the least change that reaches a yield, and the cost of that change.
+    """Return the design with the smallest change that reaches a yield, and the cost of that change.
 
     ``reach_yield("3dof-15mm", target=0.95).design`` goes to ``generate``; ``target`` is the share
     of random builds that are good. Order of stacking, bond, overhang, base plate and ears may
-    change; keys in ``changes`` and ``tables`` stay. In the result, ``changes`` has both values of
-    each key, ``comparison`` the figures of both designs, ``share`` the share; ``design`` is
-    None if no change reaches the target, and ``sentence`` explains why. Raises DesignError.
+    change; keys in ``changes`` and ``tables`` do not change. In the result, ``changes`` has both
+    values of each key, ``comparison`` the figures of both designs, ``share`` the share; ``design``
+    is None if no change reaches the target, and ``sentence`` explains why. Raises DesignError.
     """
     fixed = frozenset(changed_keys([*changes, tables]))
     return run_reach_yield(load(source, *changes, **tables), target, fixed)
@@ -133,7 +134,7 @@ def sweep(
     progress: Progress | None = None,
     **tables: Any,
 ) -> SweptDesigns:
-    """Checks and predicts a design with varied keys; writes one row per design.
+    """Check and predict a design with varied keys; write one row per design.
 
     Files go to ``out/<name>-sweep/``. ``vary`` has the values of each key, ``{"chamber.diameter":
     numpy.linspace(4, 8, 9), "stack.balloons": [3, 6, 9]}`` (lengths in mm), or their range as

@@ -1,4 +1,4 @@
-"""Assemblies put together: rigid poses, the tree of parts, their designs and places."""
+"""Construction of assemblies: rigid poses, the tree of parts, their designs and places."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ Rows = tuple[Vector, Vector, Vector]
 
 
 class PartPose(NamedTuple):
-    """A rigid pose: a point p of a part's frame goes to ``rows p + shift``."""
+    """A rigid pose: a point p of a part's frame maps to ``rows p + shift``."""
 
     rows: Rows = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     shift: Vector = (0.0, 0.0, 0.0)
@@ -70,7 +70,7 @@ def shifted(x: float, y: float, z: float) -> PartPose:
 
 
 def about_axis(degrees: float) -> PartPose:
-    """A turn about z; quarter turns are exact."""
+    """Return a rotation about z; quarter turns are exact."""
     c, s = unit(degrees)
     return PartPose(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
 
@@ -108,10 +108,10 @@ FOR_LINES: tuple[Seat, ...] = ("lumen", "inlet")
 
 
 def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
-    """Return part names, the root first, each after its host; else in the file's order.
+    """Return part names, the root first, each after its host; otherwise in the file's order.
 
-    Raises DesignError unless there is exactly one root, and if a part is fixed on an unknown part,
-    in a circle, or at a place that its host does not have.
+    Raises DesignError unless there is exactly one root, and for a part fixed on an unknown part, in
+    a cycle, or at a place that its host lacks.
     """
     roots = [name for name, part in parts.items() if part.on is None]
     for name, part in parts.items():
@@ -123,8 +123,8 @@ def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
             )
     if len(roots) > 1:
         raise DesignError(
-            f"{listed(roots)} are fixed on nothing; give all but one of them on = the part that "
-            "each is fixed on"
+            f"{listed(roots)} have no key on; set on = NAME of the supporting part for all but "
+            "one of them"
         )
     order = list(roots)
     for name in order:
@@ -136,9 +136,7 @@ def building_order(parts: Mapping[str, AnyPart]) -> tuple[str, ...]:
             walk.append(host)
         circle = walk[walk.index(host) :]
         how = "are fixed on each other in a circle" if circle[1:] else "hangs on itself"
-        raise DesignError(
-            f"{listed(circle)} {how}; leave out on and at in the part that all others are fixed on"
-        )
+        raise DesignError(f"{listed(circle)} {how}; omit on and at in the root part")
     return tuple(order)
 
 
@@ -163,7 +161,7 @@ def _check_joint(name: str, part: AnyPart, parts: Mapping[str, AnyPart]) -> None
 
 
 def places_for(part: AnyPart, host: AnyPart) -> tuple[Seat, ...]:
-    """Return the places for a part on its host: lines run inside, all else sits outside."""
+    """Return the places for a part on its host: lines run inside, all others sit outside."""
     is_line = isinstance(part, Line)
     return tuple(place for place in PLACES[host.kind] if (place in FOR_LINES) == is_line)
 
@@ -183,7 +181,7 @@ RESERVED = frozenset(
 
 @dataclass(frozen=True)
 class PartDesign:
-    """A design that parts are made from; ``design.order.quantity`` counts all of them."""
+    """A design from which parts are made; ``design.order.quantity`` counts all of them."""
 
     design: Design
     laminate: Laminate
@@ -192,9 +190,9 @@ class PartDesign:
 
 @dataclass(frozen=True)
 class PlacedPart:
-    """A part in its place: ``turn`` about its own axis comes first, ``pose`` is last.
+    """A part in its place: ``turn`` about its own axis comes first, ``pose`` last.
 
-    Only an SBA is ``made`` from a design or bent round a ``radius`` in mm.
+    Only an SBA is ``made`` from a design or bent to a ``radius`` in mm.
     """
 
     name: str
@@ -205,12 +203,12 @@ class PlacedPart:
 
     @property
     def turn(self) -> float:
-        """Degrees about its own axis."""
+        """The rotation about its own axis, degrees."""
         return self.part.turn
 
     @property
     def height(self) -> float:
-        """Size along its own axis, mm; an SBA's is computed from the nominal films."""
+        """The size along its own axis, mm; for an SBA, from the nominal films."""
         if self.made is not None:
             return self.made.laminate.thickness
         return girth_and_height(self.part)[1]
@@ -221,13 +219,13 @@ class PlacedPart:
         return self.pose.at(p if self.radius is None else bent_point(p, self.radius))
 
     def turned(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Points (n, 3) in mm turned about the part's own axis, before bending and placing."""
+        """Points (n, 3) in mm rotated about the part's own axis, before bending and placing."""
         return about_axis(self.turn).points(points)
 
     def upright(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return points (n, 3) in mm of the part's own frame in the assembly, not bent.
+        """Return points (n, 3) in mm of the part's frame in the assembly, without bending.
 
-        A part that lies on a tube stands on the tangent.
+        A part on a tube stands on the tangent.
         """
         turned = self.turned(points)
         if self.radius is not None:
@@ -255,7 +253,7 @@ class Assembled:
         return next(part for part in self.parts if part.name == name)
 
     def on(self, placed: PlacedPart) -> PlacedPart | None:
-        """Return the host that a part is fixed on; None for the root."""
+        """Return the host of a part; None for the root."""
         return None if placed.part.on is None else self[placed.part.on]
 
 
@@ -307,7 +305,7 @@ def _designs(assembly: Assembly) -> tuple[PartDesign, ...]:
 
 
 def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
-    """Return the design of an SBA part, with the part's and the assembly's own keys set.
+    """Return the design of an SBA part, with the part's and the assembly's keys applied.
 
     Raises DesignError that names the part.
     """
@@ -316,8 +314,7 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
         table = read_toml(path)
         if table.get("family") == ASSEMBLY:
             raise DesignError(
-                f"design = {shown(part.design)} is an assembly; a part is made from the design of "
-                "one actuator"
+                f"design = {shown(part.design)} is an assembly; use the design of a single actuator"
             )
         data = override(table, [part.set, assembly.shared])
         data.setdefault("name", path.stem)
@@ -330,13 +327,13 @@ def _read_part(assembly: Assembly, name: str, part: Sba) -> Design:
 
 
 def design_source(design: str, folder: Path) -> str | Path:
-    """The source of a design: a bare word names a template, a path starts at the file's folder."""
+    """Return the source of a design: a plain word is a template, a path is relative to the file."""
     return folder / design if Path(design).name != design or "." in design else design
 
 
 def _keep_files(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
-    """Resolve an outline and a kit's file that the assembly's file names against its folder, not
-    the design's.
+    """Resolve an outline and a kit's file named in the assembly's file against its folder, not the
+    design's.
     """
     chamber, kit = part.set.get("chamber"), data.get("kit")
     if isinstance(chamber, dict) and isinstance(chamber.get("outline"), str):
@@ -349,14 +346,14 @@ def _keep_files(data: dict[str, Any], part: Sba, assembly: Assembly) -> None:
 def _check_root(name: str, source: PartDesign | None) -> None:
     if source is not None and source.design.form.wrap is not None:
         raise DesignError(
-            f'parts.{name} is a radial design; wrap it round a tube: on = a tube, at = "outside"'
+            f'parts.{name} is a radial design; wrap it around a tube: on = a tube, at = "outside"'
         )
 
 
 def _joined(
     name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart
 ) -> tuple[PartPose, float | None]:
-    """Return the pose of a part on its host, and the radius that an SBA is bent round."""
+    """Return the pose of a part on its host, and the radius to which an SBA is bent."""
     _check_kinds(name, part, source, host)
     if isinstance(part, Line) and host.made is not None and part.at == "inlet":
         return _at_inlet(name, part, host, host.made.laminate), None
@@ -390,7 +387,7 @@ def _at_inlet(name: str, line: Line, host: PlacedPart, laminate: Laminate) -> Pa
 
 
 def inlet_of(name: str, line: Line, host: str, laminate: Laminate) -> Inlet:
-    """Return the inlet that a line goes into. Raises DesignError if there is none."""
+    """Return the inlet of a line. Raises DesignError if there is none."""
     inlets: Mapping[str, Inlet] = {inlet.chamber: inlet for inlet in laminate.inlets}
     if line.chamber not in inlets:
         known = ", ".join(inlets)
@@ -401,18 +398,18 @@ def inlet_of(name: str, line: Line, host: str, laminate: Laminate) -> Inlet:
 
 
 def _check_kinds(name: str, part: AnyPart, source: PartDesign | None, host: PlacedPart) -> None:
-    """Refuse joints that the kinds allow and a design's family does not. Raises DesignError."""
+    """Refuse joints allowed for the kinds but not for a design's family. Raises DesignError."""
     if source is not None and source.design.form.wrap is not None:
         if part.at != "outside":
             _check_root(name, source)
         if part.turn % 180 != 0:
             raise DesignError(
-                f"parts.{name}.turn = {part.turn:g} turns a radial design out of line with its "
-                "tube; it must be 0 or 180"
+                f"parts.{name}.turn = {part.turn:g} misaligns a radial design with its tube; it "
+                "must be 0 or 180"
             )
     if host.radius is not None and part.at != "inlet":
         raise DesignError(
-            f'parts.{name}.on = "{host.name}", which is bent round a tube and has no flat face; '
+            f'parts.{name}.on = "{host.name}", which is bent around a tube and has no flat face; '
             "fix it on another part"
         )
     if part.at == "lumen" and host.made is not None and host.made.laminate.lumen is None:

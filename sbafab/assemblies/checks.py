@@ -1,4 +1,4 @@
-"""Checks of assemblies as findings: joints, supply tubes, ways through holes, collisions."""
+"""Checks of assemblies as findings: joints, supply tubes, clearance in holes, collisions."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _judged(
     /,
     **facts: Any,
 ) -> Finding:
-    """Return a finding about parts, of which its sentence names the first and its host."""
+    """Return a finding about parts; its sentence names the first part and its host."""
     names = tuple(part.name for part in parts)
     facts = {**dict(zip(("part", "host"), names, strict=False)), **facts}
     finding = judged(rule, verdict, limit, measured, unit, Place(), sentence, **facts)
@@ -48,7 +48,7 @@ def _judged(
 
 
 def joints(assembled: Assembled, *at: Seat) -> Iterator[tuple[PlacedPart, PlacedPart]]:
-    """Yield each part that is fixed on another (at these places, if any is named), and its host."""
+    """Yield each part that is fixed on another (at these places, if named), and its host."""
     for placed in assembled.parts:
         host = assembled.on(placed)
         if host is not None and (not at or placed.part.at in at):
@@ -56,7 +56,7 @@ def joints(assembled: Assembled, *at: Seat) -> Iterator[tuple[PlacedPart, Placed
 
 
 def tube_match(assembled: Assembled) -> Iterator[Finding]:
-    """Check that an SBA bent round a tube was made for it, or at least goes round it once."""
+    """Check that an SBA bent around a tube was made for it, or at least goes around it once."""
     tolerance = assembled.assembly.rules.tube_tolerance
     for both in joints(assembled, "outside"):
         placed, tube = both[0], both[1].part
@@ -86,7 +86,7 @@ def inlet_match(assembled: Assembled) -> Iterator[Finding]:
 
 
 def line_clearance(assembled: Assembled) -> Iterator[Finding]:
-    """Check the clearance round a line in the lumen or tube that it runs through."""
+    """Check the clearance around a line in its lumen or tube."""
     limit = assembled.assembly.rules.line_clearance
     for both in joints(assembled, "lumen"):
         line, host = both[0].part, both[1]
@@ -101,10 +101,10 @@ def line_clearance(assembled: Assembled) -> Iterator[Finding]:
 
 
 def seat(assembled: Assembled) -> Iterator[Finding]:
-    """Check the share of the smaller of two glued faces that lies on the other.
+    """Check the contact share of the smaller of two glued faces.
 
-    A part round a tube must lie on it, and a line in a lumen must run through it; a line in
-    an inlet is fixed by its strip.
+    A part around a tube must lie on it, and a line in a lumen must run through it; a line in an
+    inlet is fixed by its strip.
     """
     limit = assembled.assembly.rules.seat_share
     for placed, host in joints(assembled):
@@ -121,7 +121,7 @@ def seat(assembled: Assembled) -> Iterator[Finding]:
 
 
 def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
-    """A line in the lumen of another part, both along that part's axis."""
+    """Check a line in the lumen of another part, both along that part's axis."""
     start, end = placed.part.along, placed.part.along + placed.height
     inside = max(0.0, min(end, host.height) - max(start, 0.0))
     share = inside / min(placed.height, host.height)
@@ -131,7 +131,7 @@ def _through(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
 
 
 def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
-    """A part on the side of a tube, whose face lies from ``along`` both ways."""
+    """Check a part on the side of a tube, whose face extends from ``along`` both ways."""
     lower = _face_of(placed, "bottom").turned(placed.turn)
     x0, y0, x1, y1 = lower.bounds
     along, length = placed.part.along, host.height
@@ -150,7 +150,7 @@ def _around(placed: PlacedPart, host: PlacedPart, limit: float) -> Finding:
 
 
 def _lower_face(placed: PlacedPart) -> Region:
-    """Return the face that is glued on, in its position on the host's face."""
+    """Return the glued face, in its position on the host's face."""
     part = placed.part
     region = _face_of(placed, "bottom").turned(part.turn)
     if part.at in ("bottom", "start"):
@@ -173,7 +173,7 @@ def _face_of(placed: PlacedPart, at: str | None) -> Region:
 
 @dataclass(frozen=True)
 class SupplyRun:
-    """A supply tube along the outside of a tube, ``angle`` degrees round it from its marked line.
+    """A supply tube along the outside of a tube, ``angle`` degrees from the tube's marked line.
 
     ``over`` are the parts with balloons under it.
     """
@@ -188,7 +188,7 @@ def folded_diameter_with_tubes(placed: PlacedPart, assembled: Assembled) -> floa
 
     The tabs fold over the outline where they leave it, or over the tube below if that is wider. On
     it lie the tab's two films, with the supply tube and the strip's mask between them; the strip's
-    end outside the tab is snipped off when the tube goes in.
+    end outside the tab is snipped off when the tube is inserted.
     """
     if placed.made is None or not placed.made.laminate.inlets:
         return None
@@ -228,7 +228,7 @@ def supply_runs(placed: PlacedPart, assembled: Assembled) -> tuple[SupplyRun, ..
 
 
 def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, float, float]]:
-    """Yield the parts round a tube: name, and the middle and half of each stack's angle."""
+    """Yield the parts around a tube: name, and the middle and half of each stack's angle."""
     for sba in assembled.parts:
         if sba.made is None or sba.radius is None or sba.part.on != tube.name:
             continue
@@ -242,7 +242,7 @@ def _covered(tube: PlacedPart, assembled: Assembled) -> Iterator[tuple[str, floa
 
 
 def _angle(tube: PlacedPart, p: Vector) -> float:
-    """Return the angle of a point round a tube, degrees anti-clockwise from its marked line."""
+    """Return the angle of a point around a tube, degrees anti-clockwise from its marked line."""
     origin, x, y = np.array([tube.at(at) for at in ((0, 0, 0), (1, 0, 0), (0, 1, 0))])
     across, up = np.array([x - origin, y - origin]) @ (np.array(p) - origin)
     return math.degrees(math.atan2(up, across)) % 360
@@ -254,7 +254,7 @@ def _angle_between(a: float, b: float) -> float:
 
 
 def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
-    """Check that supply tubes stay off balloons that press on the wall of a lumen."""
+    """Check that supply tubes stay clear of balloons that press on the wall of a lumen."""
     if assembled.assembly.deploy.lumen_diameter is None:
         return
     for placed in assembled.parts:
@@ -273,7 +273,7 @@ def supply_tubes(assembled: Assembled) -> Iterator[Finding]:
 
 
 def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun]) -> Clause:
-    """Return the remedy: the turn, in whole degrees, with every tube farthest from balloons."""
+    """Return the remedy: the rotation, in whole degrees, with every tube farthest from balloons."""
     tube = assembled.on(placed)
     assert tube is not None
     covered = list(_covered(tube, assembled))
@@ -296,7 +296,7 @@ def _remedy(placed: PlacedPart, assembled: Assembled, supply: Sequence[SupplyRun
 
 
 class _Passage(NamedTuple):
-    """The diameter that a part needs, mm, with films as bought and at its folded height."""
+    """The diameter in mm that a part needs, with films as bought and at its folded height."""
 
     part: PlacedPart
     nominal: float
@@ -305,10 +305,10 @@ class _Passage(NamedTuple):
 
 
 def aperture(assembled: Assembled) -> Iterator[Finding]:
-    """Check that each part passes the aperture, lobes folded and all else as it is.
+    """Check that each part passes through the aperture with lobes folded.
 
-    Folded sizes are predicted: if only the thinner, pressed laminate passes, or the paper gives
-    no folded size of a part, the verdict is a warning.
+    Folded sizes are predicted: if only the thinner, pressed laminate passes, or the paper gives no
+    folded size of a part, the verdict is a warning.
     """
     hole = assembled.assembly.deploy.aperture_diameter
     if hole is None:
@@ -342,7 +342,7 @@ def _passage(placed: PlacedPart) -> _Passage:
 
 
 def lumen_pass(assembled: Assembled) -> Iterator[Finding]:
-    """Check that the deflated assembly passes the lumen, tabs folded back with a tube in each."""
+    """Check that the deflated assembly, with tabs folded back, passes through the lumen."""
     lumen = assembled.assembly.deploy.lumen_diameter
     if lumen is None:
         return
@@ -403,9 +403,9 @@ TOUCH = 0.05
 
 
 def collision(assembled: Assembled) -> Iterator[Finding]:
-    """Check that no two parts share space: a finding for each pair that does, or one for none.
+    """Check that no two parts intersect: one finding per intersecting pair, or one for none.
 
-    An SBA bent round a tube lies on it by construction; this pair is not compared.
+    An SBA bent around a tube lies on it by construction; this pair is not compared.
     """
     solids = {p.name: placed_surface(p, filled=True).manifold() for p in assembled.parts}
     lying = {(p.name, p.part.on) for p in assembled.parts if p.part.at == "outside"}
@@ -459,7 +459,7 @@ def run_checks(assembled: Assembled) -> tuple[Finding, ...]:
 
 
 def lowered_checks(rules: AssemblyRules, name: str | None = None) -> tuple[str, ...]:
-    """Each limit (of one check) that an assembly weakens, with its value and the usual one."""
+    """Return each relaxed limit (of one check) of an assembly, with its value and the default."""
     usual = AssemblyRules()
     limits = (
         ("line_clearance", "line-clearance", rules.line_clearance < usual.line_clearance),

@@ -1,4 +1,4 @@
-"""Assembly files in and out: TOML to records, resolved TOML, hashes, and the entries of parts."""
+"""Assembly files: TOML to records, resolved TOML, hashes, and the entries of parts."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def load(
 
 
 def load_text(text: str, path: Path) -> Design | Assembly:
-    """Return the design or assembly of a text as if read from ``path``. Raises DesignError."""
+    """Return the design or assembly in a text, as if read from ``path``. Raises DesignError."""
     data = toml_tables(text, path.name)
     if data.get("family") == ASSEMBLY:
         return assembly_of(data, path)
@@ -74,7 +74,7 @@ def assembly_of(data: Mapping[str, Any], path: Path) -> Assembly:
     tables = data.get("parts")
     if not isinstance(tables, dict) or not tables:
         raise DesignError(
-            "an assembly has a table for each part; add [parts.NAME] with kind = one of "
+            "an assembly needs a table for each part; add [parts.NAME] with kind = one of "
             f"{listed(KINDS)}"
         )
     parts = {name: _part(name, table) for name, table in tables.items()}
@@ -104,7 +104,7 @@ def plain_tables(assembly: Assembly) -> dict[str, Any]:
 
 
 def resolved(assembled: Assembled) -> dict[str, Any]:
-    """The assembly with every default written out; designs refer to the parts' folders."""
+    """Return the assembly with every default written out; designs refer to the parts' folders."""
     assembly = assembled.assembly
     table = assembly.model_dump(mode="json", exclude={"kit", "sheets", "laser", "press"})
     for name, part in table["parts"].items():
@@ -117,23 +117,23 @@ def resolved(assembled: Assembled) -> dict[str, Any]:
 
 
 def assembly_toml(assembled: Assembled) -> str:
-    """Return the ``design.toml`` of an output folder; it builds the same assembly again."""
+    """Return the ``design.toml`` of an output folder, which builds the same assembly again."""
     import tomli_w
 
     return tomli_w.dumps(resolved(assembled))
 
 
 def assembly_sha256(assembled: Assembled) -> str:
-    """Return the hash of all inputs of the output, the designs of the parts included."""
+    """Return the hash of all inputs of the output, including the designs of the parts."""
     table = resolved(assembled)
     digests = {source.design.name: design_sha256(source.design) for source in assembled.designs}
     return tables_sha256([table, digests])
 
 
 def assembled_sha256(assembled: Assembled) -> str:
-    """Return the hash of the assembly itself: parts, places, glue, and the actuators among them.
+    """Return the hash of the assembly itself: parts, places, glue, and its actuators.
 
-    Without name, order, pose of the pictures, notes and limits.
+    Name, order, pose of the pictures, notes and limits are excluded.
     """
     parts = {}
     for name, part in resolved(assembled)["parts"].items():
@@ -144,7 +144,7 @@ def assembled_sha256(assembled: Assembled) -> str:
 
 
 def part_entry(placed: PlacedPart) -> dict[str, Any]:
-    """A part and its place: turned about its own axis, bent round a radius, rows and shift."""
+    """Return a part and its place: rotation about its axis, bending radius, rows and shift."""
     part = placed.part
     rounded = [[round(value, 9) + 0.0 for value in row] for row in placed.pose.rows]
     return {

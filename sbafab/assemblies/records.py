@@ -1,7 +1,7 @@
-"""Records of an assembly file: parts, joints, places that the whole must fit, and limits.
+"""Records of an assembly file: parts, joints, passages that the whole must fit, and limits.
 
-Defaults are the paper's (Sec. 2.1) if it gives a figure; else ours, and the field says so.
-Lengths are mm, angles degrees.
+Defaults are the paper's (Sec. 2.1) if it gives a value; otherwise the field states that they are
+ours. Lengths are in mm, angles in degrees.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ Words = Annotated[str, Field(max_length=120)]
 
 
 class Fixed(Section):
-    """The joint of a part. The root, which all others hang on, has no ``on``."""
+    """The joint of a part. The root, which supports all others, has no ``on``."""
 
     on: str | None = None
     """The part that this one is fixed on."""
@@ -90,7 +90,7 @@ class Magnet(Fixed):
 
 
 class Cup(Fixed):
-    """A cast suction cup, a bell: its narrow end is glued on, its wide end is open."""
+    """A cast, bell-shaped suction cup: its narrow end is glued on, its wide end is open."""
 
     kind: Literal["cup"]
     """A cast suction cup."""
@@ -119,7 +119,7 @@ class Cup(Fixed):
 
 
 class Line(Fixed):
-    """A tube for vacuum or fluid that runs through a lumen or goes into an inlet."""
+    """A tube for vacuum or fluid through a lumen or into an inlet."""
 
     kind: Literal["line"]
     """Tubing for vacuum or fluid."""
@@ -138,7 +138,7 @@ class Line(Fixed):
 
 
 class Base(Fixed):
-    """A flat piece that parts stand on."""
+    """A flat base for other parts."""
 
     kind: Literal["base", "sheet"]
     """A flat piece."""
@@ -156,8 +156,8 @@ AnyPart = Sba | Tube | Magnet | Cup | Line | Base
 
 
 def girth_and_height(part: AnyPart) -> tuple[float, float]:
-    """Return the diameter of the smallest round hole that a bought part passes, and its size along
-    its own axis, mm.
+    """Return the diameter of the smallest round hole that a purchased part passes, and its size
+    along its own axis, mm.
     """
     match part:
         case Tube() | Line():
@@ -184,7 +184,7 @@ KINDS: dict[str, type[AnyPart]] = {
 
 
 class Deploy(Section):
-    """The places that the assembly must fit; none by default."""
+    """The passages that the assembly must fit; none by default."""
 
     aperture_diameter: Length | None = None
     """It must pass this hole, folded (paper, Sec. 5: 9.25)."""
@@ -246,18 +246,18 @@ class Assembly(Section):
     def _counts_wholes(cls, order: OrderSection) -> OrderSection:
         if order.good is not None:
             raise ValueError(
-                "has good, which counts the actuators of one design; give order.copies of an "
+                "has good, which counts the actuators of one design; use order.copies for an "
                 "assembly"
             )
         return order
 
     @property
     def folder(self) -> Path:
-        """The start of relative paths of part designs: the folder of the assembly's file."""
+        """The base of relative paths of part designs: the folder of the assembly's file."""
         return self._folder
 
     def placed(self, folder: Path) -> Self:
-        """Return the assembly with relative paths that start at ``folder``."""
+        """Return the assembly with relative paths based on ``folder``."""
         copy = self.model_copy()
         copy._folder = folder
         return copy

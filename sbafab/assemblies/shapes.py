@@ -35,7 +35,7 @@ def placed_surface(placed: PlacedPart, filled: bool = False) -> Surface:
 
 
 def bent_surface(placed: PlacedPart, filled: bool = False) -> Surface:
-    """Return the surface before its pose: turned about its own axis and bent round its tube."""
+    """Return the surface before its pose: rotated about its own axis and bent around its tube."""
     if placed.radius is None:
         surface = own_surface(placed, filled)
         return Surface(placed.turned(surface.points), surface.faces)
@@ -68,7 +68,7 @@ def filled_slabs(laminate: Laminate) -> list[Slab]:
 
 
 def face(part: AnyPart) -> Region:
-    """Return the end face of a bought part, at its own origin."""
+    """Return the end face of a purchased part, in its own frame."""
     if isinstance(part, Tube | Line):
         return _ring(part.outer_diameter, part.inner_diameter)
     if isinstance(part, Magnet):
@@ -85,7 +85,7 @@ def _ring(outer: float, inner: float) -> Region:
 
 
 def _bell(cup: Cup) -> Surface:
-    """A cup's surface: its section, counter-clockwise from its bore, turned round its axis."""
+    """A cup's surface: its section, counter-clockwise from its bore, revolved about its axis."""
     bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
     inside = max(neck - cup.wall, bore)
     outer = [(bore, 0.0), (neck, 0.0), (rim, cup.height)]
@@ -97,10 +97,10 @@ MOULD_WALL, DOWEL, DOWEL_PLAY = 4.0, 2.0, 0.1
 
 
 def cup_mould(cup: Cup) -> tuple[Surface, Surface]:
-    """Return lower and upper half of the mould that a cup is cast in, its rim up.
+    """Return the lower and upper half of the mould for casting a cup, rim up.
 
-    The lower half has its outside, the upper one its inside and a pin for its bore, which goes
-    into a hole of the lower half. Ours, not tried.
+    The lower half forms the outside, the upper one the inside with a pin for the bore, which enters
+    a hole of the lower half. Our own design, untested.
     """
     bore, neck, rim = cup.bore / 2, cup.neck / 2, cup.diameter / 2
     inside, out, foot = max(neck - cup.wall, bore), rim + MOULD_WALL, -DOWEL - MOULD_WALL
@@ -114,7 +114,7 @@ def cup_mould(cup: Cup) -> tuple[Surface, Surface]:
 
 
 def _turned(outline: Sequence[tuple[float, float]]) -> Surface:
-    """Return a section (r, z), counter-clockwise, turned round the axis."""
+    """Return a section (r, z), counter-clockwise, revolved about the axis."""
     section = np.array(outline)
     angles = np.arange(AROUND) * (2 * math.pi / AROUND)
     r, z = section.T

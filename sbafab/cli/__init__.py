@@ -1,4 +1,4 @@
-"""The command line: the table of commands and the group that runs one; a command is a module."""
+"""The command line: the table of commands and the group that runs them."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ HOMES = {
 
 
 class CommandTable(UserDict[str, Any]):
-    """Commands by name; a command's module is imported when the command is first looked up."""
+    """Commands by name; a command's module is imported at its first look-up."""
 
     def __getitem__(self, name: str) -> click.Command:
         command: click.Command | None = self.data[name]
@@ -153,7 +153,7 @@ class CommandGroup(click.Group):
 
 
 def similar_commands(name: str) -> list[str]:
-    """Return the commands that begin with ``name``; if none does, the most similar one, if any."""
+    """The commands that begin with ``name``; if there are none, the most similar one, if any."""
     typed = name.lower()
     beginning = [command for command in SUMMARIES if typed and command.startswith(typed)]
     if beginning:

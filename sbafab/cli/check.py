@@ -38,12 +38,12 @@ DEFAULT_KIT = "paper"
 def check(source: str, as_json: bool, **options: Any) -> None:
     """Run the rules on a design or on an output folder.
 
-    Nothing is written. FOLDER was written by sbafab generate; the files on disk are checked.
+    No files are written. For a FOLDER written by sbafab generate, the files on disk are checked.
     """
     is_folder = source not in api.template_names() and Path(source).is_dir()
     if is_folder and (options["assignments"] or options["waivers"] or options["target_yield"]):
         raise DesignError(
-            "--set, --waive and --target-yield go with a design; leave them out to check a folder"
+            "--set, --waive and --target-yield apply to a design; omit them to check a folder"
         )
     if is_folder:
         failed = _check_folder(Path(source), options["nets"], options["verbose"], as_json)
@@ -65,14 +65,14 @@ def _check_design(
 ) -> bool:
     """Check a design or an assembly and print the outcome; return True if a rule failed.
 
-    Raises DesignError, also if press or sheets cannot make it.
+    Raises DesignError, also if press or sheets are unsuitable.
     """
     source = either_of(name, assignments, waivers)
     for flag, value in (("--target-yield", target_yield), ("--nets", nets)):
         if value is not None and not isinstance(source, api.Design):
             raise DesignError(
-                f"{flag} goes with a design, and this is an assembly; check its parts' designs "
-                "one by one"
+                f"{flag} applies to a single design, but this is an assembly; check its parts' "
+                "designs one by one"
             )
     advice, has_target = (
         None,

@@ -1,4 +1,4 @@
-"""``sbafab reproduce`` and ``calibrate``: measured beside predicted; models fitted."""
+"""``sbafab reproduce`` and ``calibrate``: measurements against predictions, and model fits."""
 
 from __future__ import annotations
 
@@ -31,18 +31,18 @@ def reproduce(source: str | None, calibration: str | None, out: Path, as_json: b
     """Compare predictions with measurements.
 
     Without SOURCE: OUT/reproduction/ receives reproduction.md, reproduction.json and a chart for
-    each predicted figure of the paper, with its error bars. All values stand beside the models of
-    films as drawn and bought, and those that were calibrated on also beside the calibrated models.
+    each predicted figure of the paper, with its error bars. All values are compared with the models
+    of films as drawn and bought, and those used for calibration also with the calibrated models.
 
-    SOURCE is the evidence that ships (paper), a file of your own (.toml or .csv), or the lab's
-    build records (.sqlite): its curves are printed beside the models, and nothing is written.
-    Ranges of model and 90 % interval span what the source leaves open.
+    SOURCE is the bundled evidence (paper), your own file (.toml or .csv), or the lab's build
+    records (.sqlite): its curves are printed beside the models, and no files are written. Ranges of
+    model and 90 % interval cover the set-ups that the source leaves open.
     """
     if source is not None:
         _print_comparison(source, calibration or api.PAPER, as_json)
         return
     if calibration is not None:
-        raise click.UsageError("--calibration goes with a SOURCE")
+        raise click.UsageError("--calibration needs a SOURCE")
     table, folder = api.PaperTable(), out / FOLDER
     table.write(folder)
     if as_json:
@@ -87,7 +87,7 @@ def _print_comparison(source: str, name: str, as_json: bool) -> None:
 
 
 def _print_curves(curves: Sequence[api.ComparedCurve]) -> None:
-    """Print a table of each curve, and below it what was assumed and why there is no model."""
+    """Print a table of each curve, then its assumptions and the reasons for missing models."""
     for curve in curves:
         axis = api.AXES[curve.x_name]
         rows = [
@@ -109,14 +109,14 @@ def _print_curves(curves: Sequence[api.ComparedCurve]) -> None:
 
 
 class OpenEntry(Document):
-    """The set-ups that a curve's source leaves open, with the probability of each."""
+    """The possible set-ups of a curve with an ambiguous source, with their probabilities."""
 
     curve: str
     probabilities: Mapping[str, float]
 
 
 class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
-    """Output of ``calibrate --json``."""
+    """The output of ``calibrate --json``."""
 
     file: Path
     calibration: dict[str, Any]
@@ -134,11 +134,11 @@ class CalibrateDocument(Document, schema="sbafab/calibrate@1"):
 def calibrate(evidence: tuple[str, ...], name: str, out: Path, as_json: bool) -> None:
     """Fit the models to measurements.
 
-    EVIDENCE is what reproduce takes: the evidence that ships (paper), a file of your own (.toml or
-    .csv), or build records (.sqlite); several are fitted together. By default it is the paper's.
-    The fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and
-    what the models miss beyond that. Each test is then predicted from a fit without it. A design
-    or kit uses the file that is written with models.calibration = "NAME.toml".
+    EVIDENCE is a source as for reproduce: the bundled evidence (paper), your own file (.toml or
+    .csv), or build records (.sqlite); several are fitted together. The default is the paper's. The
+    fit gives modulus ratio, pocket loss, press factor and delays with their uncertainty, and the
+    remaining model error. Each test is then predicted from a fit without it. A design or kit uses
+    the resulting file with models.calibration = "NAME.toml".
     """
     _check_name(name)
     path = out / f"{name}.toml"
@@ -173,21 +173,17 @@ def _check_name(name: str) -> None:
             "as lab"
         )
     if name in (api.NONE, api.PAPER):
-        raise DesignError(
-            f"--name is {api.shown(name)}, which stands for another one; give another name"
-        )
+        raise DesignError(f"--name is {api.shown(name)}, which is reserved; give another name")
 
 
 def _refuse_another_file(path: Path) -> None:
-    """Raise DesignError if a file that is no calibration, such as a kit, has this path."""
+    """Raise DesignError if an existing file at this path is not a calibration, such as a kit."""
     try:
         schema = str(api.read_toml(path).get("schema"))
     except DesignError:
         schema = ""
     if path.exists() and not schema.startswith("sbafab/calibration@"):
-        raise DesignError(
-            f"{path} exists, is not a calibration, and is not overwritten; give another --name"
-        )
+        raise DesignError(f"{path} exists and is not a calibration; give another --name")
 
 
 def _print(fitted: api.CalibrationFit) -> None:

@@ -1,4 +1,4 @@
-"""Ends of commands: exit codes, one sentence for an error or a signal, and no traceback."""
+"""The end of commands: exit codes, one sentence for an error or a signal, and no traceback."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ RAISE_AGAIN_SECONDS = 0.01
 
 
 def end(kind: ErrorKind, sentence: str, code: int, as_json: bool) -> NoReturn:
-    """Print an error in one sentence, with ``as_json`` also as JSON on standard output, and exit
+    """Print an error as one sentence, with ``as_json`` also as JSON on standard output, and exit
     with ``code``.
     """
     print_error(sentence)
@@ -73,7 +73,7 @@ def prepared_streams() -> None:
 
 @contextmanager
 def exit_plainly(as_json: bool = False) -> Iterator[None]:
-    """Turn any error or signal in the block into one sentence and an exit code."""
+    """Convert any error or signal in the block to one sentence and an exit code."""
     received: list[int] = []
     try:
         try:
@@ -121,7 +121,7 @@ def _discard_output() -> None:
 
 @contextmanager
 def _interrupted_by_signals(received: list[int]) -> Iterator[None]:
-    """Raise KeyboardInterrupt for SIGINT, SIGTERM and SIGHUP, so that a run tidies up.
+    """Raise KeyboardInterrupt for SIGINT, SIGTERM and SIGHUP, so that a run cleans up.
 
     ``received`` collects the numbers of the signals.
     """

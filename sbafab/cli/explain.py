@@ -22,7 +22,7 @@ def _completed(ctx: click.Context, param: click.Parameter, typed: str) -> list[C
 def explain(name: str | None, as_json: bool) -> None:
     """Explain a rule, a key of design files, a quantity, or a flag of figures.
 
-    Without NAME: list all rules and checks, a line each. A section such as chamber lists its keys.
+    Without NAME: list all rules and checks, one per line. A section such as chamber lists its keys.
     """
     if name is None:
         if as_json:

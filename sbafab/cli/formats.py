@@ -1,4 +1,4 @@
-"""The formats of files and of what commands print with ``--json``: a JSON schema and an id each.
+"""The formats of files and of ``--json`` output: a JSON schema and an id each.
 
 ``sbafab schema`` prints them.
 """
@@ -24,7 +24,7 @@ DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
 class YieldRunDocument(RunDocument, schema=RunDocument.SCHEMA):
-    """A folder, and the changes of --target-yield; figures as given and as changed."""
+    """A folder, and the changes of --target-yield; figures before and after the changes."""
 
     reached: YieldEntry | None = Field(None, alias="yield")
 
@@ -44,7 +44,7 @@ class ErrorDocument(Document, schema=ERROR_SCHEMA):
 
 
 class Format(NamedTuple):
-    """A format: the entry of its record, what it describes, and an id if its record has none."""
+    """A format: the entry of its record, its description, and an id if its record has none."""
 
     entry: str
     about: str
@@ -52,7 +52,7 @@ class Format(NamedTuple):
 
     @property
     def record(self) -> Any:
-        """The record, loaded when first asked for."""
+        """The record, loaded on demand."""
         return plugins.load(f"sbafab.{self.entry}")
 
     @property
@@ -144,7 +144,7 @@ def schema_of(name: str) -> dict[str, Any]:
 @click.command()
 @click.argument("name", type=click.Choice(FORMATS), default="design", required=False)
 def schema(name: str) -> None:
-    """Print a JSON schema, by default of design files.
+    """Print a JSON schema, by default that of design files.
 
     Editors use it to complete and check design files; the other schemas describe JSON output.
     """

@@ -60,7 +60,7 @@ def map_(
             "is for a MuJoCo model; give --to FILE.xml, or leave it out", "pressures"
         )
     if pressure <= 0:
-        raise DesignError(f"--pressure is {pressure:g} kPa; give more than 0 kPa")
+        raise DesignError(f"--pressure is {pressure:g} kPa; it must be above 0 kPa")
     design = api.load_design(source, assignments, ())
     api.refuse_pressure(pressure)
     api.refuse_beyond_burst(api.build(design), pressure)
@@ -77,14 +77,14 @@ def map_(
 
 
 def _listed(pressures: str | None, chambers: int) -> tuple[float, ...]:
-    """Return pressures in kPa, one a chamber. Raises BadParameter, DesignError."""
+    """Return pressures in kPa, one per chamber. Raises BadParameter, DesignError."""
     if pressures is None:
         return (MODEL_PRESSURE,) * chambers
     each = tuple(opt.PRESSURE.convert(text, None, None) for text in pressures.split(","))
     if len(each) != chambers:
         raise DesignError(
-            f"--pressures has {len(each)} of {chambers} pressures; give one a "
-            "chamber, with commas between them, such as 10,0,0"
+            f"--pressures has {len(each)} of {chambers} pressures; give one per chamber, "
+            "separated by commas, such as 10,0,0"
         )
     return each
 
@@ -143,9 +143,9 @@ def picture(
     """Draw the inflated actuator as picture, animation or scene.
 
     The elastic stack computes the pose at the given pressures or volumes. Balloons are drawn as
-    modelled between their plates, without ears and inlet tubes. Drawn pockets that are nearly round
-    are replaced by discs of equal area. No model inflates oblong and other drawn pockets: these are
-    drawn flat, to NAME-flat.png.
+    modelled between their plates, without ears and inlet tubes. Nearly round drawn pockets are
+    replaced by discs of equal area. There is no model of oblong and other drawn pockets: these are
+    drawn flat, in NAME-flat.png.
     """
     if pressures and volumes:
         raise DesignError("give --pressure or --volume, not both")

@@ -1,6 +1,6 @@
-"""``sbafab generate``, ``cut``, ``press``, ``mesh``, ``nest``, ``simulate``: a folder each.
+"""``sbafab generate``, ``cut``, ``press``, ``mesh``, ``nest``, ``simulate``: one folder each.
 
-Each runs a design, prints the table of its files, and exits by the verdict.
+Each runs a design, prints the table of its files, and sets the exit code by the verdict.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ from sbafab.errors import DesignError
 
 def _chord_error(ctx: click.Context, _: click.Parameter, value: float | None) -> float:
     if value is not None and ctx.params["dxf_profile"] != "chords":
-        raise click.UsageError("--chord-error goes with --dxf-profile chords; add it")
+        raise click.UsageError("--chord-error needs --dxf-profile chords; add it")
     return value or TRUE_ARCS.chord_error
 
 
 def cut_options(command: opt.Command) -> opt.Command:
-    """Add ``--dxf-profile`` and ``--chord-error``, for readers that cannot read bulges, and
+    """Add ``--dxf-profile`` and ``--chord-error``, for programs that cannot read bulges, and
     ``--copies``, which sets a key of the design.
     """
     profile = opt.option(
@@ -69,8 +69,8 @@ def generate(source: Design | Assembly, target_yield: float | None, **settings: 
 
     --decks also writes calculix/, sofa/ and mujoco/, like `sbafab simulate --export`. An assembly
     has a folder for each of its designs, and sheets, a traveller and a solid of the whole.
-    --target-yield prints what it changed and what that costs, and the folder's design.toml is the
-    changed design; if the share is not reached, nothing is written and the exit code is 1.
+    --target-yield prints the changes and their cost, and the folder's design.toml is the changed
+    design; if the share is not reached, no files are written and the exit code is 1.
     """
     if target_yield is None:
         _run(runs.generate, source, **settings)
@@ -81,8 +81,8 @@ def generate(source: Design | Assembly, target_yield: float | None, **settings: 
         _run(runs.generate, design, before=before, more=more, **settings)
     else:
         raise DesignError(
-            "--target-yield goes with a design, and this is an assembly; generate its parts' "
-            "designs one by one, and name the files it writes in the assembly"
+            "--target-yield applies to a single design, but this is an assembly; generate its "
+            "parts' designs one by one, and use the resulting files in the assembly"
         )
 
 
@@ -150,7 +150,8 @@ def nest(designs: Sequence[Design], **settings: Any) -> None:
     """Cut several designs from the same film sheets.
 
     OUT/<name>/ receives a folder for each DESIGN, and sheets/ with the parts of all. Overrides
-    apply to every design. Copies: --copies of every design, else each design's order.copies.
+    apply to every design. --copies sets the number of every design; the default is each design's
+    order.copies.
     """
     _run(runs.nest, designs, **settings)
 
@@ -218,7 +219,7 @@ def _print_run(run: Run) -> None:
 
 
 def _order_facts(run: Run) -> Facts:
-    """Yield rows on several designs: parts, copies, verdict, notes, film, meshes and folder."""
+    """Yield rows about several designs: parts, copies, verdict, notes, film, meshes and folder."""
     index = run.manifest
     if run.between is not None:
         yield "assembly", f"{index['name']}, {index['design_sha256'][:12]}"
@@ -243,7 +244,7 @@ def _order_facts(run: Run) -> Facts:
 
 
 def _design_facts(run: Run) -> Facts:
-    """Yield rows on a design's run."""
+    """Yield rows about a design's run."""
     index, laminate = run.manifest, run.laminate
     balloons = show.several(laminate.balloons, "balloon")
     sha256 = index["design_sha256"][:12]
@@ -276,7 +277,7 @@ def _design_facts(run: Run) -> Facts:
 
 
 def _press_facts(run: Run) -> Facts:
-    """Yield rows on folds, seams, press steps and press cycles."""
+    """Yield rows about folds, seams, press steps and press cycles."""
     schedule = run.schedule
     if schedule is None:
         return
@@ -309,7 +310,7 @@ def _minutes(value: float | None) -> str:
 
 
 def _mesh_facts(run: Run) -> Facts:
-    """Yield rows on meshes and simulator decks."""
+    """Yield rows about meshes and simulator decks."""
     index = run.manifest
     if index["meshes"]:
         yield "meshes", ", ".join(mesh["file"] for mesh in index["meshes"])
@@ -435,7 +436,7 @@ def simulate(design: Design, as_json: bool, **settings: Any) -> None:
 
 @contextmanager
 def _printed_warnings() -> Iterator[None]:
-    """Print warnings as sentences on standard error at once: a run may take hours after them."""
+    """Print warnings as sentences on standard error at once, since a run may then take hours."""
     with warnings.catch_warnings():
         warnings.simplefilter("always", UserWarning)
         warnings.showwarning = lambda message, *_: print_error(f"warning: {message}")

@@ -1,4 +1,4 @@
-"""``sbafab kerf`` and ``inspect``: the kerf from a coupon, a picture of a cut sheet."""
+"""``sbafab kerf`` and ``inspect``: the kerf from a coupon; the inspection of a cut sheet."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST_LINES = 20
 
 
 class KerfEstimate(Document):
-    """Fit of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
+    """A fit of ``count`` sizes: kerf in mm and scale as a ratio, with 95 % half widths."""
 
     kerf: api.Value
     scale: api.Value | None
@@ -33,7 +33,7 @@ class KerfEstimate(Document):
 
 
 class KerfDocument(Document, schema="sbafab/kerf@1"):
-    """Output of ``kerf --json``."""
+    """The output of ``kerf --json``."""
 
     all: KerfEstimate = attribute("overall")
     x: KerfEstimate | None
@@ -48,10 +48,10 @@ class KerfDocument(Document, schema="sbafab/kerf@1"):
 
 
 def _film(context: click.Context, option: click.Parameter, name: str) -> str:
-    """Return the name of a film; raises BadParameter for one that no film can have."""
+    """Return the name of a film. Raises BadParameter for an invalid name."""
     if not re.fullmatch(api.FILM_NAME, name):
         raise click.BadParameter(
-            f"{name!r} is not the name of a film; give tpe, ptfe or a table of [films]"
+            f"{name!r} is not the name of a film; give tpe, ptfe or the name of a table in [films]"
         )
     return name
 
@@ -92,9 +92,9 @@ def kerf(
 ) -> None:
     """Compute the kerf from a filled coupon.csv.
 
-    `sbafab new coupon` writes the piece to cut and the table to fill in. Measure thin film with a
-    scanner or a microscope rather than a calliper, which bends it. A constant reading error and a
-    scale error are separated from the kerf.
+    `sbafab new coupon` writes the coupon to cut and the table to fill in. Measure thin film with a
+    scanner or a microscope, since a calliper bends it. A constant reading error and a scale error
+    are separated from the kerf.
     """
     sizes = api.read_measurements(measurements, instrument or "")
     calibration = api.calibrated(sizes, resolution)
@@ -246,9 +246,9 @@ def inspect(
     """Compare a scan or photograph of a cut sheet with its cut file.
 
     FOLDER is an output folder, or a cut file such as coupon.dxf. PICTURE shows the pieces in their
-    places without the waste, or the sheet that they fell out of. Measures the kerf and names
-    missing and wrong pieces. OUT receives the picture with deviations (.svg), the result (.json),
-    sizes for `sbafab kerf` (_sizes.csv) and an entry for `sbafab record --history` (_history.json).
+    places without the waste, or the sheet without the pieces. Measures the kerf and lists missing
+    and wrong pieces. OUT receives the picture with deviations (.svg), the result (.json), sizes for
+    `sbafab kerf` (_sizes.csv) and an entry for `sbafab record --history` (_history.json).
     """
     if find_spec("skimage") is None or find_spec("scipy") is None:
         raise DesignError('sbafab inspect needs scikit-image: pip install "sbafab[scan]"')
@@ -275,8 +275,8 @@ def _reference(
     resolution = stated if dpi is None else (dpi, dpi)
     if not photo and resolution is None and bar is None and not pins:
         raise DesignError(
-            f"{picture.path} states no resolution; give --dpi as scanned, --bar or --pins, or "
-            "--photo to take the scale from the cut edges themselves"
+            f"{picture.path} states no resolution; give the --dpi of the scan, --bar or --pins, "
+            "or --photo to take the scale from the cut edges"
         )
     return api.Reference(resolution, bar, pins)
 
@@ -298,7 +298,7 @@ def _write_inspection(inspection: api.Inspection, out: Path) -> list[Path]:
 
 
 def _print_inspection(inspection: api.Inspection, paths: list[Path]) -> None:
-    """Print kerf, scale, edges and the pieces amiss, and last the verdict."""
+    """Print kerf, scale, edges and the faulty pieces, and last the verdict."""
     kerf, scale, sheet = inspection.kerf, inspection.scale, inspection.sheet
     low, high = kerf.interval
     is_pieces = inspection.location.content == "pieces"

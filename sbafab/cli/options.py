@@ -1,4 +1,4 @@
-"""Options that commands share: quantities with units, shell completion, DESIGN and -o, --set."""
+"""Options shared by commands: quantities with units, shell completion, DESIGN and -o, --set."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def by_chamber(
     """Return values by chamber: the callback of a repeatable option of type OfChamber."""
     chambers = dict(values)
     if len(chambers) < len(values):
-        raise click.BadParameter("each chamber may be given once", ctx, param)
+        raise click.BadParameter("give each chamber only once", ctx, param)
     return chambers
 
 
@@ -156,7 +156,7 @@ def rules(ctx: click.Context, param: click.Parameter, typed: str) -> list[Comple
 
 
 def assignments(ctx: click.Context, param: click.Parameter, typed: str) -> list[CompletionItem]:
-    """Complete ``KEY=``, and after it the values of a key that has a choice."""
+    """Complete ``KEY=`` and, after it, the values of a key with a choice."""
     # By name: `sbafab new` has options too, and needs no family.
     kinds = plugins.load("sbafab.api.designs:kinds_of_keys")()
     tables = {path.rpartition(".")[0] for path in kinds}
@@ -203,7 +203,7 @@ def option(flags: str, words: str, kind: Any = None, **settings: Any) -> Decorat
 
 
 def design_argument(name: str = "source", **settings: Any) -> Decorator:
-    """Return the argument of a design, which a shell completes."""
+    """Return the argument of a design, with shell completion."""
     return click.argument(name, shell_complete=designs, **{"metavar": "DESIGN", **settings})
 
 
@@ -216,13 +216,13 @@ json_option = option("--json as_json", "Print the result as JSON.", bool)
 
 
 def pressures_option(words: str, default: str) -> Decorator:
-    """Return ``--pressure``, repeatable, whose help begins with ``words``."""
+    """Return ``--pressure``, repeatable, with a help text that begins with ``words``."""
     words += f", kPa or with a unit. Repeatable.  [default: {default}]"
     return option("--pressure pressures_kpa", words, PRESSURE, multiple=True)
 
 
 def flow_option(words: str) -> Decorator:
-    """Return the option of a flow in ml/min, whose help begins with ``words``."""
+    """Return the option of a flow in ml/min, with a help text that begins with ``words``."""
     return option(
         "--flow flow_ml_min", f"{words}, ml/min or with a unit.", FLOW, default="35 ml/min"
     )
@@ -245,19 +245,19 @@ WAIVE_CUT = "Write the cut files although this rule fails; they will state it. R
 
 
 def _refuse_file(ctx: click.Context, _: click.Parameter, out: Path) -> Path:
-    """Raises BadParameter for the name of a design file, and OutputError for a folder that is a
-    file, before anything is computed.
+    """Raise BadParameter for the name of a design file, and OutputError for a folder that is a
+    file, before any computation.
     """
     refuse_file_as_folder(out)
     if out.suffix.lower() == ".toml":
         has_file = any("--to" in param.opts for param in ctx.command.params)
         mend = f"; write --to {out} for a file" if has_file else ""
-        raise click.BadParameter(f"{str(out)!r} is a file's name, and -o takes a folder{mend}")
+        raise click.BadParameter(f"{str(out)!r} is the name of a file, but -o needs a folder{mend}")
     return out
 
 
 def folder_option(words: str, default: str = ".") -> Decorator:
-    """Return ``-o``, the folder that a command writes into."""
+    """Return ``-o``, the output folder of a command."""
     return option(
         "-o --out OUT",
         words,
@@ -272,13 +272,13 @@ out_option = folder_option("Folder in which OUT/<name>/ is written.", "out")
 
 
 def file_option(name: str) -> Decorator:
-    """Return ``--to``, the design file to write instead of the one called ``name``."""
+    """Return ``--to``, the design file to write instead of the one named ``name``."""
     words = f"Write FILE, which ends in .toml, instead of {name}; its stem names the design."
     return option("--to FILE", words, file_path(dir_okay=False))
 
 
 def design_file(to: Path | None, out: Path, name: str) -> Path:
-    """Return the file of ``--to``, else the one called ``name`` in the folder of ``-o``."""
+    """Return the file of ``--to``, else the one named ``name`` in the folder of ``-o``."""
     if to is None:
         return out / name
     refuse_options("names a folder and --to a file; leave one out", "out")
@@ -299,8 +299,8 @@ def refuse_options(why: str, *names: str) -> None:
 def run_options(load: Callable[..., Any], is_several: bool = False) -> Decorator:
     """Add DESIGN, or any number of them, and the options of a writing command.
 
-    The command gets the design that ``load`` makes of the name, keys and waivers, or a list of
-    them, then ``out`` and ``as_json``; ``copies`` of ``cut_options`` is a key of the design.
+    The command receives the design that ``load`` makes from the name, keys and waivers, or a list
+    of them, then ``out`` and ``as_json``; ``copies`` of ``cut_options`` is a key of the design.
     """
 
     def add(command: Command) -> Command:

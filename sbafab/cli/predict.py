@@ -75,12 +75,12 @@ def predict(
 ) -> None:
     """Predict size, stroke, force, time and bending.
 
-    Prints the main figures, with the paper's measurements where models differ from them by more
-    than a quarter. -v and predict.json, which is written with plots, hold all figures with their
-    models and validity. A design that fails a rule is predicted on the screen only (exit code 1).
-    Where the folder holds another design's files, the prediction goes into one beside it.
-    Of an assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at
-    one pressure (default 10 kPa).
+    Prints the main figures, with the paper's measurements if models deviate from them by more than
+    a quarter. -v and predict.json, which is written with plots, give all figures with their models
+    and validity. For a design that fails a rule, the prediction is only printed (exit code 1). If
+    the folder holds another design's files, the prediction goes into a folder beside it. For an
+    assembly it prints reach, load, grip in its lumen, and collisions of inflated parts, at one
+    pressure (default 10 kPa).
     """
     if not isinstance(design, api.Design):
         _refuse_for_assembly(design, pressures_kpa)
@@ -130,7 +130,7 @@ def predict(
 
 
 def _print_sensitivity(rows: Sequence[api.SensitivityRow], pressure: float) -> None:
-    """Print by how much 1 % more of each key moves stroke and bend."""
+    """Print the changes of stroke and bend for 1 % more of each key."""
     show.line(f"\nat {pressure:g} kPa 1 % more of     moves the free stroke    the bend")
     for row in rows:
         bend = "" if row.bend is None else f"{row.bend:+.2f} %"
@@ -153,7 +153,7 @@ def _refuse_for_design(design: api.Design) -> None:
 
 
 def _refuse_for_assembly(assembly: api.Assembly, pressures: tuple[float, ...]) -> None:
-    """Raise UsageError for an option that only the prediction of a single design uses."""
+    """Raise UsageError for an option that applies only to a single design."""
     reason = (
         f"is for one actuator, and {assembly.name} is an assembly; predict the part's own design"
     )
@@ -161,13 +161,13 @@ def _refuse_for_assembly(assembly: api.Assembly, pressures: tuple[float, ...]) -
     reason = f"is for written files, and the prediction of {assembly.name} is only printed"
     opt.refuse_options(f"{reason}; leave it out", "out", "waivers")
     if len(pressures) > 1:
-        raise click.UsageError("an assembly is predicted at one pressure; give --pressure once")
+        raise click.UsageError("an assembly needs a single pressure; give --pressure once")
 
 
 def _predict_assembly(
     assembly: api.Assembly, as_json: bool, pressure_kpa: float, load_g: float
 ) -> None:
-    """Predict an assembly and print it; exits with 1 if inflated parts collide."""
+    """Predict an assembly and print it; exit with 1 if inflated parts collide."""
     prediction = api.predict_assembly(assembly, pressure_kpa=pressure_kpa, load_g=load_g)
     if as_json:
         show.document({"schema": api.SCHEMA, **asdict(prediction)})

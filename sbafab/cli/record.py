@@ -1,4 +1,4 @@
-"""``sbafab record``: results of builds in the lab's file, and a report on all of them."""
+"""``sbafab record``: results of builds in the lab's file, and a report about them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,9 @@ def _row_key(
         return None
     match = re.fullmatch(r"(e?)(\d{1,9})", value)
     if match is None:
-        raise click.BadParameter(f"{value!r} is neither a record such as 3 nor an entry such as e3")
+        raise click.BadParameter(
+            f"{value!r} is neither a record, such as 3, nor an entry, such as e3"
+        )
     return api.HistoryEntry if match[1] else api.Record, int(match[2])
 
 
@@ -104,9 +106,9 @@ def _row_key(
 def record(lab: Path, assignments: tuple[str, ...], as_json: bool, **values: Any) -> None:
     """Record the results of builds, and report on them.
 
-    DESIGN is the name of a template, a TOML file or the output folder of the build, of an assembly
-    too. Records are never changed: --correct adds a record that replaces another. No data leaves
-    this computer.
+    DESIGN is a template's name, a TOML file or the output folder of the build, also for an
+    assembly. Records are never changed: --correct adds a record that replaces another. No data
+    leaves this computer.
 
     \b
     sbafab record 3dof-15mm --serial A1 --leak pass --stroke 16.8
@@ -154,12 +156,12 @@ GOES_WITH: Mapping[str, tuple[str, ...]] = {
 
 
 def _task(values: Mapping[str, Any]) -> str:
-    """Return the name of what the options ask for. Raises UsageError."""
+    """Return the name of the requested task. Raises UsageError."""
     task = next((name for name in GOES_WITH if name in values), "design")
     for name in values:
         if name not in (task, *GOES_WITH[task]):
             raise click.UsageError(
-                f"{_flag(name)} does not go with {_flag(task)}; give one after the other"
+                f"{_flag(name)} cannot be combined with {_flag(task)}; use them separately"
             )
     if "design" not in values and "design" in (task, *GOES_WITH[task]):
         raise click.UsageError("give the DESIGN that was built, --find or --report")
@@ -172,7 +174,7 @@ def _flag(name: str) -> str:
 
 
 def _new_rows(values: Mapping[str, Any]) -> Sequence[api.LabRow]:
-    """Return the results, or the lines of history, that the options state."""
+    """Return the results, or the history entries, in the options."""
     if "table" in values:
         return api.recording.read_batch(values["table"])
     if not values.keys() & {"entry", "history"}:
@@ -187,7 +189,7 @@ def _new_rows(values: Mapping[str, Any]) -> Sequence[api.LabRow]:
 
 
 def _result(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the options state of a result, by column."""
+    """Return the result in the options, by column."""
     return {column: values[column] for column in ("serial", *RESULTS) if column in values}
 
 
@@ -196,7 +198,7 @@ def _pairs(text: str) -> dict[str, str]:
     try:
         words = shlex.split(text)
     except ValueError:
-        raise click.UsageError(f"--entry {text!r} has a quotation mark without its other") from None
+        raise click.UsageError(f"--entry {text!r} has an unmatched quotation mark") from None
     pairs = [word.partition("=") for word in words]
     if not all(name and sign for name, sign, _ in pairs):
         raise click.UsageError(f"--entry {text!r} must be fields such as step=1 minutes=20")
@@ -204,7 +206,7 @@ def _pairs(text: str) -> dict[str, str]:
 
 
 def _correct(store: api.Lab, values: Mapping[str, Any]) -> api.LabRow:
-    """Store the row that corrects another."""
+    """Store a row that corrects another."""
     kind, number = values["correct"]
     is_entry = kind is api.HistoryEntry
     change = _pairs(" ".join(values.get("entry", ()))) if is_entry else _result(values)
@@ -217,7 +219,7 @@ def _correct(store: api.Lab, values: Mapping[str, Any]) -> api.LabRow:
 
 
 def _matches(store: api.Lab, values: Mapping[str, Any]) -> api.Contents:
-    """Return what --find and --serial find, or all. Raises DesignError for nothing."""
+    """The rows that match --find and --serial, or all. Raises DesignError if there are none."""
     records, entries, builds = store.contents()
     serial = values.get("serial", "")
     text = values.get("find", serial)
@@ -226,8 +228,8 @@ def _matches(store: api.Lab, values: Mapping[str, Any]) -> api.Contents:
         entries = api.recording.matching(text, serial, entries, builds)
     if not records and not entries:
         raise DesignError(
-            f"no record goes with {text[:60]!r}; give a serial, a design's name, 8 digits or more "
-            "of its sha256, or what the traveller's code says"
+            f"no record matches {text[:60]!r}; give a serial, a design's name, at least 8 digits "
+            "of its sha256, or the text of the traveller's code"
         )
     return api.Contents(records, entries, builds)
 
@@ -284,7 +286,7 @@ FITTED = ("stroke_mm", "force_n", "height_mm")
 
 
 def _print_report(report: api.Report, as_json: bool) -> None:
-    """Print success, measured against predicted values, advice, and last the counts."""
+    """Print success rates, measured against predicted values, advice, and last the counts."""
     document = api.ReportDocument.of(report)
     if as_json:
         show.document(document)

@@ -110,7 +110,7 @@ def _request(source: str, options: dict[str, Any]) -> api.FindRequest:
 
 
 def _print_found(result: api.FoundDesign, origin: str, target: Path) -> None:
-    """Print the design with its figures, what binds and the front; or the nearest miss."""
+    """Print the design with its figures, binding constraints and the front; or the nearest miss."""
     title, style = ("Best design", "bold") if result.holds else ("Nearest miss", "bold red")
     show.line(f"{title}: {api.format_keys(result.best.values)}, from {origin}", style)
     _print_quantities(result)
@@ -143,8 +143,8 @@ def _print_found(result: api.FoundDesign, origin: str, target: Path) -> None:
 
 
 def _binding_limits(result: api.FoundDesign) -> Iterator[str]:
-    """Yield what single steps would break, ranges, and rules without room of a design that
-    holds.
+    """Yield the constraints that single steps would break, ranges, and rules without margin, for a
+    passing design.
     """
     for bind in result.binds:
         yield f"{bind.key} = {api.format_value(bind.value)}: {bind.breaks}"
@@ -175,7 +175,7 @@ USEFUL_KPA = 50.0
 
 
 def _more_pressure(result: api.FoundDesign) -> str:
-    """Return the advice for a missed force: the same one at more pressure; empty for others."""
+    """The advice for a missed force: the same force at a higher pressure; empty for others."""
     for row in result.request.requirements:
         quantity, laminate = row.quantity, result.best.laminate
         if quantity.name != "force" or not row.at_least or laminate is None:
@@ -286,7 +286,7 @@ def compare(
     assignments: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Compare two designs: what differs, what each reaches.
+    """Compare two designs: their differences and figures.
 
     A and B are templates, design files or output folders. OUT/compare/compare.html has pictures of
     both side by side.
@@ -316,9 +316,10 @@ def compare(
 def changed_for_yield(
     design: Design, target: float, as_json: bool
 ) -> tuple[Design, dict[str, Any], Callable[[], None]]:
-    """Return a design changed for a yield, its entry as JSON, and what prints the changes.
+    """Return a design changed for a yield, its entry as JSON, and a function that prints the
+    changes.
 
-    Exits with 1 if none reaches it.
+    Exits with 1 if no change reaches it.
     """
     with show.progress(as_json) as progress:
         fixed = frozenset(api.changed_keys(click.get_current_context().params["assignments"]))
@@ -338,6 +339,6 @@ def changed_for_yield(
 
 
 def _print_figures(comparison: api.comparing.DesignComparison, names: Sequence[str]) -> None:
-    """Print the main figures of both designs, below the names of the columns."""
+    """Print the main figures of both designs, below the column names."""
     main = api.comparing.figure_rows(pair for pair in comparison.figures if pair.main)
     show.table("Figures, in parentheses the 90 % interval", names, main)

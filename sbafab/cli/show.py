@@ -56,7 +56,7 @@ def width() -> int:
 
 
 def _print_grid(grid: Table) -> None:
-    """Print a table of rich, whose import takes longer than the printing of lines."""
+    """Print a table with rich, whose import takes longer than printing lines."""
     from rich.console import Console
 
     class PipedConsole(Console):
@@ -87,7 +87,7 @@ def wrapped(words: str, style: str = "", indent: str = "", first: str | None = N
 
 
 def phrases(label: str, each: Iterable[str]) -> None:
-    """Print ``label: a, b, c``, with lines broken between phrases only."""
+    """Print ``label: a, b, c``, with lines broken only between phrases."""
     words = ", ".join(phrase.replace(" ", NO_BREAK) for phrase in each)
     wrapped(words, indent=" " * (len(label) + 2), first=f"{label}: ")
 
@@ -158,7 +158,7 @@ SHARE_OF = {"pin-fit": "stretch", "registration-yield": "hold"}
 
 
 def findings(groups: Groups, verbose: bool = False) -> None:
-    """Print a line for every rule (of several groups only if ``verbose``), and the remedies."""
+    """Print a line for every rule (for several groups only if ``verbose``), and the remedies."""
     for name, group in groups.items():
         if len(groups) > 1:
             line(f"{name}: {counted(group)}", "bold")
@@ -200,13 +200,13 @@ def remedies(group: Sequence[Finding]) -> None:
 
 
 def verdict(sentence: str, path: Path | None = None) -> None:
-    """Print the last line of a command that is done; with -q only the ``path`` written."""
+    """Print the last line of a finished command; with -q only the ``path`` written."""
     line(sentence, "bold")
     written(path)
 
 
 def written(path: Path | None) -> None:
-    """With -q: print the folder or file that a command wrote, if any."""
+    """With -q: print the folder or file written by a command, if any."""
     if is_requested(QUIET) and path is not None:
         result(path)
 
@@ -220,7 +220,7 @@ def failure(sentence: str) -> None:
 
 
 def note(words: str) -> None:
-    """Print a note on standard error, unless -q is given."""
+    """Print a note on standard error, except with -q."""
     if not is_requested(QUIET):
         click.echo(f"note: {words}", err=True)
 
@@ -232,7 +232,7 @@ def passed(name: str, groups: Groups, details: str = "", path: Path | None = Non
 
 
 def failed(name: str, group: Iterable[Finding], consequence: str, change: str) -> None:
-    """Print the verdict of what failed: the rules, the consequence and two remedies.
+    """Print the verdict of a failure: the rules, the consequence and two remedies.
 
     A rule cannot be waived for files on disk, only for their design (``change`` is FILES).
     """
@@ -252,12 +252,12 @@ def failed_rules(group: Iterable[Finding]) -> list[str]:
 
 
 def end_failed() -> NoReturn:
-    """End the command as one whose design failed."""
+    """End the command because its design failed."""
     click.get_current_context().exit(RULE_FAILED)
 
 
 def limit_text(finding: Finding) -> str:
-    """Return a limit behind ">=" if it is a lower one, behind "<=" if it is an upper one."""
+    """Return a limit after ">=" for a lower one, "<=" for an upper one."""
     if finding.limit is None:
         return "no target" if finding.rule in SHARE_OF else ""
     # By name: what prints no findings loads neither rules nor numpy.
@@ -266,7 +266,7 @@ def limit_text(finding: Finding) -> str:
 
 
 def _unit(finding: Finding) -> str:
-    """Return the unit of a finding's figures; a share's is a per cent sign and its denominator."""
+    """Return the unit of a finding's figures; for a share, a per cent sign and its denominator."""
     return f"% {SHARE_OF[finding.rule]}" if finding.rule in SHARE_OF else finding.unit
 
 
@@ -299,8 +299,8 @@ RATE_AFTER_SECONDS = 1.0
 
 
 def add_verbosity(command: click.Command) -> None:
-    """Add the option -v to a command, unless it has one of that name, and -q to one that writes
-    files or checks them.
+    """Add the option -v to a command, unless it has one, and -q to a command that writes or checks
+    files.
     """
     taken = {name for option in command.params for name in option.opts}
     if "-v" not in taken:
@@ -323,7 +323,7 @@ def _add_flag(command: click.Command, short: str, key: str, words: str) -> None:
 
 
 def _quietly(callback: Callable[..., Any] | None) -> Callable[..., Any]:
-    """Return a callback that with -q prints nothing but by ``result``."""
+    """Return a callback that, with -q, prints only through ``result``."""
     assert callback is not None
 
     @functools.wraps(callback)
@@ -338,7 +338,7 @@ def _quietly(callback: Callable[..., Any] | None) -> Callable[..., Any]:
 
 
 def result(value: object) -> None:
-    """Print a line on standard output, with -q too."""
+    """Print a line on standard output, also with -q."""
     context = click.get_current_context(silent=True)
     click.echo(value, file=context.meta.get(RESULTS) if context else None)
 
@@ -351,9 +351,9 @@ def is_requested(key: str) -> bool:
 
 @contextmanager
 def progress(quiet: bool) -> Iterator[Progress]:
-    """Show the progress of the block on standard error, as ``quiet``, -q and -v require.
+    """Show the progress of the block on standard error, according to ``quiet``, -q and -v.
 
-    On a terminal a live line; elsewhere plain lines, the first after some seconds.
+    On a terminal it is a live line; elsewhere plain lines, the first after some seconds.
     """
     if quiet or is_requested(QUIET):
         yield ignore_progress
@@ -365,7 +365,7 @@ def progress(quiet: bool) -> Iterator[Progress]:
 
 
 class Stages:
-    """Clock of a command and of its present stage, in seconds."""
+    """A clock of a command and its current stage, in seconds."""
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
         self._clock = clock
@@ -373,7 +373,7 @@ class Stages:
         self._current = ("starting", 0, 0)
 
     def report(self, stage: str, done: int, total: int) -> bool:
-        """Record progress; return True if a stage begins: another total, or less done."""
+        """Record progress; return True if a stage begins: a new total, or a smaller count."""
         _, previous, previous_total = self._current
         begins = total != previous_total or done < previous
         if begins:
@@ -388,7 +388,7 @@ class Stages:
 
     @property
     def text(self) -> str:
-        """Stage and counts; rate, of several, and time left once there is a rate; time elapsed."""
+        """Stage and counts; the rate for several; remaining time if known; elapsed time."""
         stage, done, total = self._current
         seconds = self._clock() - self._stage_start
         elapsed = f"{_clock(self.elapsed)} elapsed"
@@ -444,7 +444,7 @@ def plain_lines(
     write: Callable[[str], object] | None = None,
     clock: Callable[[], float] = time.monotonic,
 ) -> Progress:
-    """Return a progress that writes a line at intervals; ``verbose``: also at every stage."""
+    """A progress function that writes a line at intervals; ``verbose``: also at every stage."""
     stages = Stages(clock)
     write = write or functools.partial(click.echo, err=True)
     interval = VERBOSE_LINE_SECONDS if verbose else LINE_SECONDS

@@ -1,4 +1,4 @@
-"""``sbafab new``, ``import`` and ``studio``: a file to start from, and a page to edit it."""
+"""``sbafab new``, ``import`` and ``studio``: a first file, and a page to edit it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ OTHERS = {COUPON: "the kerf's calibration piece", KIT: "films, tubes, press, las
 
 
 class TemplateEntry(Document):
-    """A design that ships."""
+    """A bundled design."""
 
     name: str
     summary: str
@@ -44,14 +44,14 @@ def templates(ctx: click.Context, param: click.Parameter, typed: str) -> list[Co
 def new(template: str | None, file: Path | None, as_json: bool) -> None:
     """Write a commented design file to start from, or list the templates.
 
-    Without TEMPLATE: list all, a line each. FILE is TEMPLATE.toml in this folder unless given.
+    Without TEMPLATE: list all, one per line. FILE is by default TEMPLATE.toml in this folder.
 
-    TEMPLATE "coupon" writes the calibration piece of the kerf, its picture and a table to fill in;
-    FILE is then a folder, "coupon" unless given. TEMPLATE "kit" writes the films, tubes, press,
-    laser and limits of the paper with their sources, for you to adapt to your lab (kit.toml).
+    TEMPLATE "coupon" writes the kerf coupon, its picture and a table to fill in; FILE is then a
+    folder, by default "coupon". TEMPLATE "kit" writes the films, tubes, press, laser and limits of
+    the paper with their sources, to be adapted to your lab (kit.toml).
     """
     if as_json and template is not None:
-        raise click.UsageError("--json lists the templates; leave TEMPLATE out")
+        raise click.UsageError("--json lists the templates; omit TEMPLATE")
     designs = template_summaries()
     if as_json:
         rows = [TemplateEntry(name=name, summary=words) for name, words in designs.items()]

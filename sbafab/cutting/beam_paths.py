@@ -1,10 +1,10 @@
 """Paths of the beam on a film sheet: contours, with lead-ins, overcuts and tabs if requested.
 
-A lead-in is a straight line in the waste that ends on the contour at a right angle, or at half of
-one: inside a hole, outside an outline. An overcut follows the contour on past its start. A tab is a
-stretch of an outline that is not cut, so that the part stays in the skeleton; holes have no tabs,
-since the pieces that fall out are waste. Tabs lie on smooth stretches, clear of corners and of the
-start. Only machine files have these: the sheet's own DXF and the layer files stay the design.
+A lead-in is a straight line in the waste that meets the contour at 90 or 45 degrees: inside a hole,
+outside an outline. An overcut continues along the contour past its start. A tab is an uncut stretch
+of an outline that holds the part in the skeleton; holes have no tabs, since their slugs are waste.
+Tabs lie on smooth stretches, clear of corners and of the start. Only machine files have these
+features: the sheet's DXF and the layer files hold the design.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ def beam_runs(
     pins: Sequence[KeepOff] = (),
     name: str = "the sheet",
 ) -> list[LaserRun]:
-    """Return the beam's paths for the contours of the sheet called ``name``, in their order.
+    """Return the beam's paths for the contours of the sheet ``name``, in order.
 
     Raises DesignError with the place if a lead-in or a tab does not fit.
     """
@@ -78,7 +78,7 @@ def beam_runs(
 def _contour_runs(
     lap: _Lap, start: float, lead: Line | None, lead_ins: LeadIns, name: str
 ) -> Iterator[LaserRun]:
-    """Yield the runs of a contour that is begun at a place along it, mm from its first vertex."""
+    """Yield the runs of a contour that starts at a distance along it, mm from its first vertex."""
     contour, end = lap.contour, start + lap.length + lead_ins.overcut
     tabs = [] if contour.is_hole or not lead_ins.tabs else _tabs(lap, start, lead_ins, name)
     if lead is None and not tabs and not lead_ins.overcut:
@@ -94,7 +94,7 @@ def _contour_runs(
 
 
 class _Lap:
-    """Positions along a contour, by their distance from its first vertex along it, mm."""
+    """Positions along a contour, as distances from its first vertex, mm."""
 
     def __init__(self, contour: Contour) -> None:
         self.contour = contour
@@ -103,7 +103,7 @@ class _Lap:
         self.length = self._ends[-1]
 
     def place(self, way: float) -> tuple[Edge, Point]:
-        """The edge at a place, and the point."""
+        """Return the edge at a position, and the point."""
         number, rest = self._number(way % self.length)
         edge = self._edges[number]
         return edge, edge.at(min(1.0, rest / edge.length))
@@ -113,7 +113,7 @@ class _Lap:
         return number, way - (self._ends[number] - self._edges[number].length)
 
     def stretch(self, first: float, last: float) -> list[Edge]:
-        """The edges from one place to another that is ahead of it, by up to two laps."""
+        """Return the edges from one position to a later one, up to two laps ahead."""
         number, rest = self._number(first % self.length)
         edges, rest_length = [], last - first
         while rest_length > TINY:
@@ -130,14 +130,14 @@ class _Lap:
 
     @property
     def middles(self) -> list[float]:
-        """The middles of the edges, longest edges first, then places all along."""
+        """Yield the midpoints of the edges, longest edges first, then positions all along."""
         spans = zip(self._edges, self._ends, strict=True)
         longest = sorted(spans, key=lambda span: -round(span[0].length, 6))[:TRIED]
         middles = [end - edge.length / 2 for edge, end in longest]
         return [*middles, *(self.length * k / TRIED for k in range(TRIED))]
 
     def is_smooth(self, first: float, last: float, tight: float) -> bool:
-        """Return True if a stretch has no corner, and no arc of a radius below ``tight``."""
+        """Return True if a stretch has no corner and no arc with a radius below ``tight``."""
         edges = self.stretch(first % self.length, first % self.length + last - first)
         bent = any(isinstance(edge, Arc) and edge.radius < tight for edge in edges)
         turns = map(left_turn, edges, edges[1:])
@@ -145,7 +145,7 @@ class _Lap:
 
 
 class _Waste:
-    """Obstacles of lead-ins: contours, engraving, parting cut, frame, pins and other lead-ins."""
+    """Obstacles for lead-ins: contours, engraving, parting cut, frame, pins and other lead-ins."""
 
     def __init__(
         self,
@@ -164,7 +164,7 @@ class _Waste:
         self._leads.append(lead)
 
     def takes(self, lead: Line, contour: Contour) -> bool:
-        """Return True if a lead-in to a contour keeps off everything."""
+        """Return True if a lead-in to a contour is clear of all obstacles."""
         reach = self._clearance
         box = widened(lead.bounds, reach)
         own_edges = set(contour.edges)
@@ -186,7 +186,7 @@ class _Waste:
         )
 
     def _leaves(self, lead: Line, own_edges: Sequence[Edge]) -> bool:
-        """Return True if a lead-in comes to its contour at its end alone."""
+        """Return True if a lead-in meets its contour only at its end."""
         for depth in DEPTHS:
             p = lead.at(1 - depth)
             least = min(SHARE * depth * lead.length, self._clearance)
@@ -198,7 +198,7 @@ class _Waste:
 
 
 def _lead_in(lap: _Lap, lead_ins: LeadIns, waste: _Waste, name: str) -> tuple[float, Line]:
-    """The first place along a contour where a lead-in has room, and the lead-in."""
+    """Return the first position along a contour with room for a lead-in, and the lead-in."""
     length = lead_ins.lead_in
     for way in lap.middles:
         edge, (x, y) = lap.place(way)
@@ -215,7 +215,7 @@ def _lead_in(lap: _Lap, lead_ins: LeadIns, waste: _Waste, name: str) -> tuple[fl
     key, clear = lead_ins.key, lead_ins.clearance
     raise DesignError(
         f"{key}.lead_in = {length:g} has no room at the {_about(lap.contour)} of {name}, "
-        f"{clear:g} mm clear of other cuts; make it shorter, or {key}.spacing larger"
+        f"{clear:g} mm clear of other cuts; shorten it, or increase {key}.spacing"
     )
 
 
@@ -226,7 +226,7 @@ def _about(contour: Contour) -> str:
 
 
 def _tabs(lap: _Lap, start: float, lead_ins: LeadIns, name: str) -> list[float]:
-    """The middles of an outline's tabs, in the order of cutting; evenly spread if possible."""
+    """Return the midpoints of an outline's tabs, in cutting order; evenly spaced if possible."""
     gap, pitch = lead_ins.gap, lap.length / lead_ins.tabs
     # A gap's width from a corner, from the start and the overcut, and from another tab.
     first, last = start + lead_ins.overcut + 1.5 * gap, start + lap.length - 1.5 * gap
@@ -247,9 +247,9 @@ def _tabs(lap: _Lap, start: float, lead_ins: LeadIns, name: str) -> list[float]:
         )
         if tab is None:
             raise DesignError(
-                f"{lead_ins.key}.tabs = {lead_ins.tabs} of {lead_ins.tab_width:g} mm have no room "
-                f"on the {_about(lap.contour)} of {name}, clear of corners and of the start; ask "
-                "for fewer or narrower tabs"
+                f"{lead_ins.key}.tabs = {lead_ins.tabs} of {lead_ins.tab_width:g} mm do not fit "
+                f"on the {_about(lap.contour)} of {name}, clear of corners and of the start; use "
+                "fewer or narrower tabs"
             )
         tabs.append(tab)
     return tabs
@@ -273,15 +273,15 @@ class BeamCurve(Protocol):
 
 
 class BeamRun(NamedTuple):
-    """Curves one after the other with the beam on, and the layer that they are on."""
+    """Consecutive curves with the beam on, and their layer."""
 
     layer: str
     curves: Sequence[BeamCurve]
 
 
 def run_difference(read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> str:
-    """Return text on a run that is missing, on another layer, or off by more than TOLERANCE;
-    "" without any.
+    """Return a description of a run that is missing, on another layer, or off by more than
+    TOLERANCE; "" if there is none.
     """
     if len(read) != len(expected):
         return f"it has {len(read)} lines, not {len(expected)}"
@@ -291,14 +291,14 @@ def run_difference(read: Sequence[BeamRun], expected: Sequence[LaserRun]) -> str
         if drawn.layer != run.layer:
             return f"{place} is one of {drawn.layer}, not of {run.layer}"
         if run.circle is None and not _agrees(drawn.curves, run.edges):
-            return f"{place} differs from what was written"
+            return f"{place} differs from the written one"
         if run.circle is not None and not _is_round(drawn.curves, *run.circle):
             return f"{place} is not the circle that was written"
     return ""
 
 
 def _agrees(curves: Sequence[BeamCurve], edges: Sequence[Edge]) -> bool:
-    """Return True if curves lie on edges, one by one; arcs may be read in several pieces."""
+    """Return True if curves match edges, one by one; an arc may be read in several pieces."""
     if math.dist(curves[0].start, edges[0].start) > TOLERANCE:
         return False
     number, share = 0, 0.0

@@ -1,9 +1,10 @@
-"""The nesting engine: bottom-left on a fine grid, from an empty sheet or round copies of one shape.
+"""The nesting engine: bottom-left on a fine grid, from an empty sheet or around copies of one
+shape.
 
-Each part goes to the lowest free place. Several fixed orders are tried. Where the parts take more
-sheets than their area needs, they are tried round copies of the shapes of most area, too: a
-lattice, or an arrangement found by a beam search if few copies fill a sheet. The best result is
-returned. Nothing is random.
+Each part goes to the lowest free place. Several fixed orders are tried. If the parts take more
+sheets than their area needs, they are also placed around copies of the shapes with the largest
+total area: a lattice, or an arrangement found by a beam search if few copies fill a sheet. The best
+result is returned. The engine is deterministic.
 """
 
 from __future__ import annotations
@@ -59,8 +60,8 @@ def bottom_left(
 ) -> tuple[Placement, ...]:
     """Return places for every part; each must fit the usable area.
 
-    Without ``lattices`` all sheets start empty. Raises DesignError if the pins leave no place
-    for one.
+    Without ``lattices`` all sheets start empty. Raises DesignError if the pins leave no room for a
+    part.
     """
     _, low_y, _, high_y = stock.usable
     window = min(high_y - low_y, _length_needed(parts, stock))
@@ -73,7 +74,7 @@ def bottom_left(
     if best.stuck is not None:
         part, where = parts[best.stuck], sheet_section(parts[best.stuck].material)
         raise DesignError(
-            f"pattern {part.pattern} of {part.design} finds no place {stock.spacing:g} mm clear of "
+            f"pattern {part.pattern} of {part.design} does not fit {stock.spacing:g} mm clear of "
             f"the {len(stock.pins)} {where}.pins; lower {where}.spacing, move the pins, or enlarge "
             "the sheet."
         )
@@ -90,16 +91,16 @@ def bottom_left(
 
 
 def sheet_section(material: Material) -> str:
-    """Return the section of a design file that describes this material's sheets."""
+    """Return the section of a design file for this material's sheets."""
     name = material.lower()
     return f"sheets.{name}" if material in FIRST else f"films.{name}.sheet"
 
 
 class _Way(NamedTuple):
-    """A way to fill: the order of the parts, and the share of their height that counts as low.
+    """A filling method: the order of the parts, and the fraction of their height that ranks places.
 
-    Sheets start with a lattice of the shape with the largest remaining area that has a lattice;
-    with ``whole_only`` only if it fills the sheet.
+    Sheets start with a lattice of the shape with the largest remaining area that has one; with
+    ``whole_only``, only if it fills the sheet.
     """
 
     order: tuple[int, ...]
@@ -109,7 +110,7 @@ class _Way(NamedTuple):
 
 
 class _Filled(NamedTuple):
-    """``reach`` is the last sheet's highest y; ``stuck`` the part that found no place at all."""
+    """``reach`` is the last sheet's highest y; ``stuck`` the first part that fits nowhere."""
 
     placements: tuple[Placement, ...]
     sheets: int
@@ -118,7 +119,7 @@ class _Filled(NamedTuple):
 
 
 def _score(filled: _Filled) -> tuple[bool, int, float]:
-    """Sort key: fewest sheets, then least length of the last; of equal results the first wins."""
+    """A sort key: fewest sheets, then the shortest last sheet; the first of equal results wins."""
     return filled.stuck is not None, filled.sheets, round(filled.reach, 3)
 
 
@@ -128,7 +129,7 @@ def _size(region: Region) -> tuple[float, float]:
 
 
 def _ways(parts: Sequence[NestPart]) -> list[_Way]:
-    """Ways to fill, large parts first by area or by longest side: small ones fit between them."""
+    """Return filling methods, large parts first by area or longest side: small ones fill gaps."""
     orders = []
     for measure in (math.prod, max):
         sizes = [-round(measure(_size(part.region)), 6) for part in parts]
@@ -138,7 +139,7 @@ def _ways(parts: Sequence[NestPart]) -> list[_Way]:
 
 
 def takes_lattices(parts: Sequence[NestPart], stock: Stock, sheets: int) -> bool:
-    """Return True if lattices may save film; bottom-left alone needs this number of ``sheets``."""
+    """True if lattices may save film, given the ``sheets`` that bottom-left placement needs."""
     shapes, shape_of = _shapes(parts)
     counts = _counts(shape_of, [part.count for part in parts])
     if max(counts.values()) < LEAST_COPIES:
@@ -157,18 +158,18 @@ def _counts(shape_of: Sequence[int], counts: Sequence[int]) -> Counter[int]:
 
 
 def _grown(shape: Region, stock: Stock) -> float:
-    """Return the area of a shape with half the spacing round it."""
+    """Return the area of a shape with half the spacing around it."""
     return grow(shape, stock.spacing / 2).area
 
 
 def _room(stock: Stock) -> float:
-    """Return the usable area with half the spacing round it."""
+    """Return the usable area with half the spacing around it."""
     low_x, low_y, high_x, high_y = stock.usable
     return (high_x - low_x + stock.spacing) * (high_y - low_y + stock.spacing)
 
 
 def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
-    """Return a length that most likely holds all parts, to limit the maps of long rolls."""
+    """Return a length that very probably holds all parts, to limit the maps of long rolls."""
     sizes = [[side + stock.spacing for side in _size(part.region)] for part in parts]
     area = sum(part.count * math.prod(size) for part, size in zip(parts, sizes, strict=True))
     low_x, _, high_x, _ = stock.usable
@@ -177,9 +178,9 @@ def _length_needed(parts: Sequence[NestPart], stock: Stock) -> float:
 
 
 def _shapes(parts: Sequence[NestPart]) -> tuple[list[Region], list[int]]:
-    """Return the distinct outlines, and the number of each part's.
+    """Return the distinct outlines, and the number of each part's outline.
 
-    Holes count as full: they are cut before all outlines, and a part in one would drop out.
+    Holes count as solid: they are cut before all outlines, and a part in one would drop out.
     """
     numbers: dict[Region, int] = {}
     shape_of = [numbers.setdefault(Region(part.region.outers), len(numbers)) for part in parts]
@@ -187,10 +188,10 @@ def _shapes(parts: Sequence[NestPart]) -> tuple[list[Region], list[int]]:
 
 
 class _Form(NamedTuple):
-    """A shape in one of its turns; ``number`` counts the forms of all shapes.
+    """A shape at one of its rotations; ``number`` counts the forms of all shapes.
 
-    ``cells``, of the shape grown by half the spacing, fill ``frame``; ``bounds`` are the bounds of
-    the shape itself; both mm, in the shape's own frame turned.
+    ``cells``, of the shape grown by half the spacing, fill ``frame``; ``bounds`` are those of the
+    shape itself; both in mm, in the rotated frame of the shape.
     """
 
     number: int
@@ -202,9 +203,9 @@ class _Form(NamedTuple):
 
 
 class _Filler:
-    """Fills sheets of the usable area up to ``top`` by a given way, on one grid.
+    """Fills sheets of the usable area up to ``top`` by a given method, on one grid.
 
-    Shapes are grown by half the spacing, so cells that are disjoint keep it.
+    Shapes are grown by half the spacing, so that disjoint cells guarantee it.
     """
 
     def __init__(self, parts: Sequence[NestPart], stock: Stock, top: float) -> None:
@@ -226,7 +227,7 @@ class _Filler:
     # The grid.
 
     def _add_forms(self, number: int, shape: Region) -> None:
-        """Add the turns of a shape that differ on the grid."""
+        """Add the rotations of a shape that differ on the grid."""
         cells, frame = raster(grow(shape, self.margin), self.cell)
         by_cells: dict[tuple[tuple[int, ...], bytes], _Form] = {}
         for turn in self.stock.turns:
@@ -255,12 +256,12 @@ class _Filler:
         return self._clear[key]
 
     def shift(self, form: _Form, row: int, column: int) -> Point:
-        """Return the shift in mm of the turned shape to a place."""
+        """Return the shift in mm of the rotated shape to a place."""
         x, y = self.origin
         return x + column * self.cell - form.frame[0], y + row * self.cell - form.frame[1]
 
     def _around(self, shape: int, turn: Turn, shift: Point) -> Iterator[Cell]:
-        """Yield up to four places whose cells together hold a shape that lies off the grid."""
+        """Yield up to four places whose cells together cover a shape that lies off the grid."""
         corner = _turned(self.form_of[shape, 0].frame, turn)
         x, y = ((corner[k] + shift[k] - self.origin[k]) / self.cell for k in (0, 1))
         for row in sorted({math.floor(y + SNAP), math.ceil(y - SNAP)}):
@@ -268,7 +269,7 @@ class _Filler:
                 yield row, column
 
     def _places(self, form: _Form) -> Cells:
-        """Return the places of a form inside the border and clear of the pins."""
+        """Return the places of a form that are inside the border and clear of the pins."""
         room = (
             self.area[side + 2] - form.bounds[side + 2] - self.shift(form, 0, 0)[side]
             for side in (1, 0)
@@ -284,9 +285,9 @@ class _Filler:
     # Copies of one shape on an empty sheet.
 
     def lattices(self) -> list[dict[int, Lattice]]:
-        """Return copies on a sheet, for the shapes of most area that come often enough.
+        """Return copies on a sheet, for the shapes with the largest area and enough copies.
 
-        They are the best lattices, and arrangements or pairs of lattices if these hold more.
+        These are the best lattices, or arrangements or pairs of lattices that hold more copies.
         """
         counts = _counts(self.shape_of, [part.count for part in self.parts])
         areas = dict.fromkeys(range(len(self.shapes)), 0.0)
@@ -305,7 +306,7 @@ class _Filler:
         return [kind for number, kind in enumerate(kinds) if kind not in kinds[:number]]
 
     def _clear_lattices(self, shape: Region) -> Iterator[Lattice]:
-        """Yield the lattices of a shape without the copies that are too near to pins."""
+        """Yield the lattices of a shape without copies too close to pins."""
         stock = self.stock
         turned = {turn: placed(shape, turn, (0.0, 0.0)) for turn in TURNS}
         for lattice in lattices_of(shape, stock.spacing, self.area, stock.turns):
@@ -317,7 +318,8 @@ class _Filler:
     def _arrangement(self, shape: int) -> Lattice:
         """Return copies of a shape, found by a beam search; none if many fit a sheet.
 
-        Each step puts a copy at an extreme free place and keeps the sheets with most free places.
+        Each step adds a copy at an extreme free place and keeps the sheets with the most free
+        places.
         """
         if _room(self.stock) > FEW * _grown(self.shapes[shape], self.stock):
             return Lattice((), 0.0)
@@ -346,7 +348,7 @@ class _Filler:
     # Sheet after sheet.
 
     def filled(self, way: _Way) -> _Filled:
-        """Fill sheet after sheet with the remaining parts, in the way's order."""
+        """Fill successive sheets with the remaining parts, in the method's order."""
         remaining = [part.count for part in self.parts]
         placements: list[Placement] = []
         on_sheet: list[Placement] = []
@@ -389,7 +391,7 @@ class _Filler:
     def _start(
         self, sheet: int, remaining: Sequence[int], way: _Way
     ) -> tuple[list[Placement], list[Cells]]:
-        """Return the lattice that a sheet starts with, and the places that it leaves free."""
+        """Return the initial lattice of a sheet, and the places that it leaves free."""
         counts = _counts(self.shape_of, remaining)
         shapes = [
             shape
@@ -427,7 +429,7 @@ class _Filler:
 
 
 def _is_clear(region: Region, shift: Point, stock: Stock) -> bool:
-    """Return True if a region that is moved keeps the spacing from all pins."""
+    """Return True if a shifted region keeps the spacing from all pins."""
     low_x, low_y, high_x, high_y = region.bounds
     for x, y, diameter in stock.pins:
         room, p = diameter / 2 + stock.spacing, (x - shift[0], y - shift[1])
@@ -472,7 +474,7 @@ class _Free:
         self.searched = [0] * len(maps)
 
     def lowest(self, shape: int) -> tuple[_Form, int, int] | None:
-        """The form that lies lowest, by the share of its height that counts; row and column."""
+        """The form with the lowest place, ranked by its height fraction; row and column."""
         spots = []
         for form in self.filler.forms:
             place = self._first(form.number) if form.shape == shape else None
@@ -485,7 +487,7 @@ class _Free:
         return self.filler.forms[number], row, column
 
     def _first(self, number: int) -> Cell | None:
-        """Return row and column of the lowest free place, the leftmost of its row."""
+        """Return row and column of the lowest free place, the leftmost in its row."""
         places = self.maps[number].reshape(-1)
         # Places are only ever taken, so the search continues where it stopped.
         start = self.searched[number]
@@ -498,7 +500,7 @@ class _Free:
         return divmod(start, columns)
 
     def occupy(self, form: _Form, row: int, column: int, shapes: set[int]) -> None:
-        """Remove the places that a form at a place blocks from the maps of these shapes."""
+        """Remove places blocked by a placed form from the maps of these shapes."""
         for near in self.filler.forms:
             places = self.maps[near.number]
             if near.shape in shapes and self.searched[near.number] < places.size:
@@ -518,7 +520,7 @@ TOUCH = 1e-7
 
 
 def raster(region: Region, cell: float) -> tuple[Cells, Bounds]:
-    """Return the cells of a region, centred in their box, so that turns of it agree; the box."""
+    """Return the cells of a region, centred in their box so that rotations match, and the box."""
     low_x, low_y, high_x, high_y = region.bounds
     columns, x = _centred(low_x, high_x, cell)
     rows, y = _centred(low_y, high_y, cell)
@@ -543,7 +545,7 @@ def aligned(region: Region, origin: Point, cell: float) -> tuple[Cells, Cell]:
 
 
 def reached(region: Region, corner: Point, shape: tuple[int, int], cell: float) -> Cells:
-    """Return the cells that a region reaches into, of a grid whose lower left is ``corner``."""
+    """Return the cells that a region touches in a grid whose lower left is ``corner``."""
     rows, columns = shape
     edge_counts = np.zeros((rows + 1, columns), dtype=np.int32)
     turns = np.zeros((rows + 1, columns), dtype=np.int32)
@@ -557,9 +559,9 @@ def reached(region: Region, corner: Point, shape: tuple[int, int], cell: float) 
 
 
 def meetings(a: Cells, b: Cells) -> Cells:
-    """Return the offsets at which cells of ``b`` meet cells of ``a``.
+    """Return the offsets at which cells of ``b`` overlap cells of ``a``.
 
-    Entry (0, 0) is where b's upper right cell lies on a's lower left one; the last, the reverse.
+    At entry (0, 0) b's upper right cell lies on a's lower left cell; the last entry is the reverse.
     """
     rows, columns = (m + n - 1 for m, n in zip(a.shape, b.shape, strict=True))
     a_row, a_first, a_end = _runs(a)
@@ -576,24 +578,24 @@ def meetings(a: Cells, b: Cells) -> Cells:
 
 
 def _runs(cells: Cells) -> tuple[Counts, Counts, Counts]:
-    """Return row, first column and the column past the last of all runs of set cells in a row."""
+    """Return row, first column and end column of all runs of set cells in a row."""
     steps = np.diff(cells.astype(np.int8), axis=1, prepend=0, append=0)
     row, first = np.nonzero(steps > 0)
     return row, first, np.nonzero(steps < 0)[1]
 
 
 def quarter_turned(cells: Cells, turns: int) -> Cells:
-    """Return the cells turned counterclockwise; rows count upward, so against NumPy's own sense."""
+    """The cells rotated 90 degrees counterclockwise, with rows upward (opposite to NumPy)."""
     return np.ascontiguousarray(np.rot90(cells, -turns))
 
 
 def _span(low: float, high: float, cell: float) -> tuple[int, int]:
-    """Return the first and last cell that an interval reaches into; first > last on a limit."""
+    """Return the first and last cell that an interval overlaps; first > last on a cell boundary."""
     return math.floor((low + TOUCH) / cell), math.ceil((high - TOUCH) / cell) - 1
 
 
 def _monotone(edge: Edge) -> list[Edge]:
-    """Return the edge cut where it turns back in x or in y."""
+    """Return the edge split where its direction in x or y reverses."""
     if not isinstance(edge, Arc):
         return [edge]
     corners = [edge.start, *map(edge.on_circle, ticks([edge], math.pi / 2, 1e-9)), edge.end]
@@ -615,7 +617,7 @@ def _heights(edge: Edge, x: Numbers) -> Numbers:
 
 
 def _add_boundary(counts: NDArray[np.int32], edge: Edge, corner: Point, cell: float) -> None:
-    """Add the edge to every cell it runs through, as steps to be summed along y."""
+    """Add the edge to every cell that it crosses, as increments to be summed along y."""
     (x0, y0), (x1, y1) = edge.start, edge.end
     rows, columns = counts.shape[0] - 1, counts.shape[1]
     low_x, high_x = sorted((x0, x1))
@@ -637,7 +639,7 @@ def _add_boundary(counts: NDArray[np.int32], edge: Edge, corner: Point, cell: fl
 
 
 def _add_winding(turns: NDArray[np.int32], edge: Edge, corner: Point, cell: float) -> None:
-    """Add, from the edge upward, its turn round the centres of the cells."""
+    """Add the winding of the edge to the cells above it, at their centres."""
     x0, x1 = edge.start[0], edge.end[0]
     rows, columns = turns.shape[0] - 1, turns.shape[1]
     # Half open, so that a corner on a column's middle counts once.
@@ -660,7 +662,7 @@ def _turned(box: Bounds, turn: Turn) -> Bounds:
 
 
 def _cell_size(shapes: Sequence[Region], area: Bounds, stock: Stock) -> float:
-    """Return the cell at which the maps of free places and of meetings stay within ``MEMORY``."""
+    """Return the cell size at which the maps of free places and overlaps stay within ``MEMORY``."""
     turns, sides = len(stock.turns), [max(_size(shape)) + stock.spacing for shape in shapes]
     maps = 2 * turns * len(shapes) * (area[2] - area[0]) * (area[3] - area[1])
     pairs = sum((a + b) ** 2 for a in sides for b in sides) * turns**2

@@ -1,4 +1,4 @@
-"""From drawn edges to a region: loose edges chained, contours kept apart, nesting checked."""
+"""From drawn edges to a region: chains loose edges, checks clearance and nesting of contours."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ TANGENT = 0.1
 
 
 def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
-    """Contours from loose edges in any order and sense, whose ends meet to within JOINED.
+    """Return contours from loose edges in any order and direction, whose ends meet within JOINED.
 
     Raises OutputError at an end that does not meet exactly one other end.
     """
@@ -32,7 +32,7 @@ def closed_loops(edges: Sequence[Edge]) -> list[Contour]:
             raise OutputError(f"contour open at x {x:.3f}, y {y:.3f}; close it.") from None
         raise OutputError(
             f"{error.ends} edges end at x {x:.3f}, y {y:.3f}, where a contour has two; "
-            "remove what is drawn twice."
+            "remove duplicates."
         ) from None
 
 
@@ -57,11 +57,11 @@ def _check_edges(a: Edge, b: Edge, neighbours: bool) -> None:
     if (goes_on or turns_back) and max(math.dist(points[0], p) for p in points) > 2 * EPSILON:
         raise OutputError(f"edge drawn twice at x {x:.3f}, y {y:.3f}; remove one.")
     if not (neighbours and turns_back):
-        raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; part them.")
+        raise OutputError(f"contours touch or cross at x {x:.3f}, y {y:.3f}; separate them.")
 
 
 def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
-    """The region with these holes and outlines, drawn in either sense.
+    """Return the region with these holes and outlines, drawn in either direction.
 
     Raises OutputError for a contour whose nesting contradicts its layer.
     """
@@ -84,7 +84,7 @@ def nested_region(inner: Sequence[Contour], outer: Sequence[Contour]) -> Region:
 
 
 def _whole(contour: Contour, centre: Point, radius: float) -> Contour:
-    """A circle as four quarter arcs from its rightmost point on; unchanged if already drawn so."""
+    """Return a circle as four quarter arcs from its rightmost point; unchanged if already so."""
     (x, y), is_hole = centre, contour.is_hole
     compass = [(x + radius, y), (x, y + radius), (x - radius, y), (x, y - radius)]
     if is_hole:

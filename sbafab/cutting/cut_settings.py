@@ -1,4 +1,4 @@
-"""Layers, colours, names and custom properties of cut files, and how they draw arcs."""
+"""Layers, colours, names and custom properties of cut files, and their representation of arcs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DxfProfile = Literal["bulges", "arcs", "chords"]
 
 
 class Curves(NamedTuple):
-    """The drawing of arcs in cut files; ``chord_error`` in mm counts for chords only."""
+    """The representation of arcs in cut files; ``chord_error`` in mm applies only to chords."""
 
     profile: DxfProfile = "bulges"
     chord_error: float = 0.005
@@ -58,17 +58,17 @@ class LeadIns:
 
     @property
     def is_plain(self) -> bool:
-        """True if contours are cut as they are."""
+        """True if contours are cut without lead-ins, overcuts and tabs."""
         return not (self.lead_in or self.overcut or self.tabs)
 
     @property
     def gap(self) -> float:
-        """Length of an outline that a tab leaves uncut, mm."""
+        """The length of an outline that a tab leaves uncut, mm."""
         return self.tab_width + self.kerf if self.tabs else 0.0
 
     @property
     def properties(self) -> dict[str, str]:
-        """Text on them for files of laser programs."""
+        """A text that describes them, for laser program files."""
         tabs = f"{self.tabs} an outline, {self.tab_width:g} mm wide, {self.gap:g} mm uncut"
         return {
             **({"LEAD_IN": f"{self.lead_in:g} mm"} if self.lead_in else {}),
@@ -82,7 +82,7 @@ PLAIN = LeadIns()
 
 @dataclass(frozen=True)
 class CutSettings:
-    """The settings of the cut files beside the laminate."""
+    """The settings of the cut files besides the laminate."""
 
     design: str
     design_sha256: str
@@ -104,9 +104,9 @@ class CutSettings:
 def file_properties(
     settings: CutSettings, material: Material, pattern: str, parts: str | None = None
 ) -> dict[str, str]:
-    """Custom properties of the cut file of one pattern, equal for all layers that share it.
+    """Return custom properties of the cut file of one pattern, equal for all layers that share it.
 
-    A film sheet says "sheet 1 of 2" for its pattern and lists its ``parts``.
+    A film sheet has "sheet 1 of 2" as its pattern and lists its ``parts``.
     """
     warning = settings.warnings.get(material)
     return {
@@ -117,7 +117,7 @@ def file_properties(
 
 
 def fixture_properties(settings: CutSettings, notes: Sequence[str] = ()) -> dict[str, str]:
-    """Custom properties of the base plate's cut file; its edges are nominal.
+    """Return custom properties of the base plate's cut file; its edges are nominal.
 
     ``notes`` inform a workshop about its holes.
     """
@@ -151,9 +151,9 @@ def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
 
 
 def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
-    """Return the kerf that a file is compensated for, as it states; None for nominal edges.
+    """Return the kerf that a file states as compensated; None for nominal edges.
 
-    Raises OutputError if it states neither.
+    Raises OutputError without a clear statement.
     """
     state, width = properties.get("KERF_STATE"), properties.get("KERF_WIDTH", "")
     if (state, width) == (UNCALIBRATED, "none"):
@@ -165,14 +165,14 @@ def kerf_of(properties: Mapping[str, str]) -> Kerf | None:
         kerf = math.nan, math.nan
     if state != COMPENSATED or not is_kerf(*kerf):
         raise OutputError(
-            f"its properties say KERF_STATE {state!r} and KERF_WIDTH {width!r}, which leaves open "
-            "how it was compensated; regenerate it"
+            f"its properties KERF_STATE {state!r} and KERF_WIDTH {width!r} do not define the "
+            "kerf compensation; regenerate it"
         )
     return kerf[0] if kerf[0] == kerf[1] else kerf
 
 
 def kerf_text(kerf: Kerf) -> str:
-    """A kerf as files and messages print it: ``0.12``, or ``0.12 x 0.1`` along x and along y."""
+    """Return a kerf as files and messages print it: ``0.12``, or ``0.12 x 0.1`` along x and y."""
     x, y = widths(kerf)
     return f"{x:g}" if x == y else f"{x:g} x {y:g}"
 
@@ -193,9 +193,9 @@ def curves_text(curves: Curves) -> str | None:
 
 
 def curves_of(text: str | None) -> Curves:
-    """Return the drawing of arcs that a file or manifest states; true arcs for None.
+    """Return the representation of arcs that a file or manifest states; true arcs for None.
 
-    Raises OutputError if the statement cannot be understood.
+    Raises OutputError if the statement is invalid.
     """
     if text is None:
         return TRUE_ARCS

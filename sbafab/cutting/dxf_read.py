@@ -1,4 +1,4 @@
-"""Cut files read back: entities, appearance, exact contours. ezdxf reads all but our own."""
+"""Reading of cut files: entities, appearance, exact contours. Foreign files are parsed by ezdxf."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ UPRIGHT = (0.0, 0.0, 1.0)
 
 
 class DrawnEntity(NamedTuple):
-    """The edges of one entity on a layer; those of a closed one are a contour."""
+    """The edges of one entity on a layer; those of a closed entity form a contour."""
 
     kind: str
     layer: str
@@ -51,9 +51,10 @@ class DrawnEntity(NamedTuple):
 
 
 def drawn_entity(entity: DXFEntity, may_be_open: bool = False) -> DrawnEntity:
-    """Return the drawing of an entity; polylines on the layers of strokes may be open, or all.
+    """Return the drawing of an entity; polylines may be open on stroke layers, or on all if
+    requested.
 
-    Raises OutputError for one that cannot be cut.
+    Raises OutputError for an entity that cannot be cut.
     """
     kind, dxf, layer = entity.dxftype(), entity.dxf, entity.dxf.layer
     name = f"{kind} (handle {dxf.handle})"
@@ -82,7 +83,7 @@ def drawn_entity(entity: DXFEntity, may_be_open: bool = False) -> DrawnEntity:
     if len(rows) < 2 or not (closed or may_be_open or layer not in (CUT_INNER, CUT_OUTER)):
         raise OutputError(f"{place} is open; close it.")
     if entity.dxfattribs().get("const_width") or any(row[2] or row[3] for row in rows):
-        raise OutputError(f"{place} has a width; draw the cut's middle without width.")
+        raise OutputError(f"{place} has a width; draw the centre line of the cut without width.")
     return DrawnEntity(kind, layer, list(_bulge_edges(rows, closed, place)), closed)
 
 
@@ -132,7 +133,7 @@ def _heights(entity: Any) -> list[float]:
 
 
 def _numbers(entity: Any) -> Iterator[float]:
-    """Yield every real number that an entity is drawn with."""
+    """Yield every real number in the definition of an entity."""
     for value in entity.dxfattribs().values():
         if isinstance(value, float):
             yield value
@@ -145,7 +146,7 @@ def _numbers(entity: Any) -> Iterator[float]:
 
 
 def _is_plain(entity: Any) -> bool:
-    """Return True if an old polyline is flat and drawn as given: not a mesh, not curve-fitted."""
+    """Return True if an old polyline is flat and not a mesh or curve-fitted."""
     return bool(entity.is_2d_polyline) and not entity.dxf.flags & ~CLOSED
 
 
@@ -162,10 +163,10 @@ SOLID = ("continuous", "bylayer")
 def check_appearance(document: Drawing) -> None:
     """Raise OutputError if a laser program would skip, break or re-order the drawing.
 
-    Every entity has to be visible, in an unbroken line, on a layer that is on, thawed and (but
+    Every entity must be visible, in a continuous line, on a layer that is on, thawed and (except
     REFERENCE) plotted, and in that layer's colour. Other programs may state this differently: an
-    entity colour equal to the layer's, a true colour of the same red, green and blue, ``ByLayer``
-    in any case. Empty layers and line weights are not checked.
+    entity colour equal to the layer's, a true colour with the same red, green and blue, ``ByLayer``
+    in upper or lower case. Empty layers and line weights are not checked.
     """
     entities = [entity for entity in document.modelspace() if entity.dxf.layer in COLOURS]
     for name in dict.fromkeys(entity.dxf.layer for entity in entities):
@@ -186,14 +187,14 @@ def check_appearance(document: Drawing) -> None:
         if dxf.get("invisible", 0):
             raise OutputError(f"{place} is invisible; show it or remove it.")
         if dxf.get("transparency") and entity.transparency > 0:
-            raise OutputError(f"{place} is transparent; make it solid.")
+            raise OutputError(f"{place} is transparent; make it opaque.")
         _check_line(dxf, place, name, "its layer's", "ByLayer")
         if dxf.get("thickness", 0.0):
-            raise OutputError(f"{place} stands {dxf.thickness:g} mm high; make it flat.")
+            raise OutputError(f"{place} has a thickness of {dxf.thickness:g} mm; set it to 0.")
 
 
 def _check_line(dxf: Any, place: str, layer: str, colour: str, linetype: str) -> None:
-    """Raise OutputError unless an entity's or layer's colour and linetype are those of a layer."""
+    """Raise OutputError unless an entity or layer has its layer's colour and linetype."""
     index, true = dxf.get("color", BY_LAYER), dxf.get("true_color")
     is_layers = abs(index) in (BY_LAYER, COLOURS[layer]) and (true is None or _is_true(true, layer))
     if not is_layers:
@@ -215,9 +216,9 @@ def _is_true(colour: int, layer: str) -> bool:
 
 
 def check_space(text: str) -> None:
-    """Raise OutputError for an entity that says it is in paper space, in a DXF text.
+    """Raise OutputError for an entity marked as paper space in a DXF text.
 
-    ezdxf goes by an entity's owner alone, other programs by this.
+    ezdxf uses only an entity's owner, other programs this mark.
     """
     if PAPER.search(text) is None:
         return
@@ -243,7 +244,7 @@ class ReadBack:
     """The content of a cut file.
 
     ``region``: the contours on CUT_INNER and CUT_OUTER; ``properties``: the custom properties,
-    which a DXF before R2004 cannot hold; ``units`` is "mm", or empty in R12, which cannot say;
+    which a DXF before R2004 cannot hold; ``units`` is "mm", or empty in R12, which has none;
     ``layers``: the layer of every entity in file order; ``other``: types of the entities that are
     not part of the region (datum, engraving, sheet), and ``strokes`` their layers and edges.
     """
@@ -257,12 +258,7 @@ class ReadBack:
 
 
 def read_profile(source: Path | str) -> ReadBack:
-    """Return the cut file at a path, or given as text.
-
-    Raises OutputError unless it is a complete DXF in millimetres of closed, separate contours of
-    lines and arcs at z = 0, holes on CUT_INNER and outlines on CUT_OUTER. Ends of loose edges
-    within 1 um of each other are joined.
-    """
+    """Return the content of the cut file at a path, or given as text."""
     name = source.name if isinstance(source, Path) else "the DXF text"
     try:
         if isinstance(source, Path):
@@ -276,8 +272,8 @@ def read_profile(source: Path | str) -> ReadBack:
 
 @lru_cache(maxsize=64)
 def _read_text(text: str) -> ReadBack:
-    """Equal texts hold the same, and are parsed once: a run reads its files when it writes them,
-    and again, from the disk, when it checks the folder.
+    """Return the content of a text, cached: a run reads its files when it writes them, and again,
+    from the disk, when it checks the folder.
     """
     plain = _as_written(text)
     if plain is not None:
@@ -303,10 +299,10 @@ def _read_text(text: str) -> ReadBack:
 
 
 def _refuse_uncut(drawn: Sequence[DrawnEntity]) -> None:
-    """Raise OutputError for an edge without length, and an unknown layer."""
+    """Raise OutputError for a zero-length edge or an unknown layer."""
     for entity in drawn:
         if any(map(_is_short, entity.edges)):
-            raise OutputError(f"{entity.place} has an edge of no length; remove it.")
+            raise OutputError(f"{entity.place} has a zero-length edge; remove it.")
         if entity.layer not in COLOURS and entity.layer != SEAM:
             raise OutputError(
                 f"{entity.place} is on layer {entity.layer}; use {', '.join(COLOURS)}."
@@ -350,7 +346,7 @@ VERTEX = re.compile(rf"{CORNER}(?: 42\n{NUMBER})?")
 
 
 def _as_written(text: str) -> tuple[list[DrawnEntity], dict[str, str]] | None:
-    """Return entities and properties of a file as the writer writes it; None for any other."""
+    """Return entities and properties of a file in this writer's format; None for any other."""
     extents, begin = EXTENTS.search(text), text.find("  2\nENTITIES\n")
     if extents is None or begin < 0:
         return None
@@ -409,11 +405,11 @@ def _parsed(text: str) -> Drawing:
     try:
         return read(StringIO(text))
     except (DXFError, ValueError, LookupError, TypeError, AttributeError) as error:
-        raise OutputError(f"not a sound DXF document ({error}); regenerate it.") from error
+        raise OutputError(f"not a valid DXF document ({error}); regenerate it.") from error
 
 
 def _contours(drawn: Sequence[DrawnEntity], layer: str) -> list[Contour]:
-    """Return the closed contours of a layer, and those that its loose edges make."""
+    """Return the closed contours of a layer, and those formed by its loose edges."""
     mine = [entity for entity in drawn if entity.layer == layer]
     loose = [edge for entity in mine if not entity.closed for edge in entity.edges]
     closed = [Contour(tuple(entity.edges)) for entity in mine if entity.closed]

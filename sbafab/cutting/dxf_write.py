@@ -1,4 +1,4 @@
-"""Cut files: ASCII DXF R2010 with true arcs, written by filling the packaged empty document."""
+"""Cut files: ASCII DXF R2010 with true arcs, written into the packaged empty document."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ DATUM_ARM = 1.0
 
 
 class Surroundings(NamedTuple):
-    """The drawing of a film sheet beside its parts: open runs of points, and its frame's far
-    corner.
+    """The drawing of a film sheet besides its parts: open runs of points, and the far corner of its
+    frame.
     """
 
     engraved: Sequence[Sequence[Point]] = ()
@@ -49,7 +49,7 @@ class Surroundings(NamedTuple):
 
 
 class LaserRun(NamedTuple):
-    """Edges one after the other on a layer, whether they close, and whether they are a circle."""
+    """Consecutive edges on a layer; whether they close, and whether they form a circle."""
 
     layer: str
     edges: tuple[Edge, ...]
@@ -69,13 +69,13 @@ def drawn(cuts: Iterable[LaserRun], sheet: Surroundings) -> Iterator[LaserRun]:
 
 
 def stroke_run(layer: str, run: Sequence[Point]) -> LaserRun:
-    """Return a run of straight lines; one that ends where it began is closed."""
+    """Return a run of straight lines; it is closed if it ends where it began."""
     edges = tuple(map(Line, run[:-1], run[1:]))
     return LaserRun(layer, edges, run[0] == run[-1])
 
 
 def contour_runs(contours: Iterable[Contour]) -> Iterator[LaserRun]:
-    """Yield contours as they are, on the layer of holes or of outlines."""
+    """Yield contours unchanged, on the layer of holes or outlines."""
     for contour in contours:
         yield LaserRun(layer_of(contour), contour.edges, True, contour.circle)
 
@@ -97,10 +97,10 @@ def dxf_text(
 ) -> str:
     """A DXF document of the contours, cut in the order given.
 
-    Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the
-    document's custom properties. The chords profile takes contours of lines only. A layer's file
-    has a cross at the origin on REFERENCE, after all cuts, and on the same layer the strokes of its
-    ``notes``; a ``sheet`` has its engraving, parting cut and frame instead.
+    Holes (clockwise) go on CUT_INNER, outlines on CUT_OUTER. ``properties`` become the document's
+    custom properties. The chords profile accepts only contours of lines. A layer's file has a cross
+    at the origin on REFERENCE, after all cuts, and on the same layer the strokes of its ``notes``;
+    a ``sheet`` has its engraving, parting cut and frame instead.
     """
     cuts = contour_runs(contours)
     if sheet is None:
@@ -174,7 +174,7 @@ def _entities(runs: Iterable[LaserRun], profile: DxfProfile = "bulges") -> Itera
         if run.circle is not None:
             yield "CIRCLE", run.layer, "AcDbCircle", _round(*run.circle)
         elif profile == "chords" and any(isinstance(edge, Arc) for edge in edges):
-            raise ValueError("an arc remains; convert the contours to chords first")
+            raise ValueError("an arc remains; convert the contours to chords")
         elif profile == "arcs" and run.layer in (CUT_INNER, CUT_OUTER):
             yield from (_edge_entity(run.layer, edge) for edge in edges)
         else:
@@ -182,7 +182,7 @@ def _entities(runs: Iterable[LaserRun], profile: DxfProfile = "bulges") -> Itera
 
 
 def _quarters(edge: Edge) -> Sequence[Edge]:
-    """The edge in arcs of at most a quarter turn."""
+    """Return the edge as arcs of at most a quarter turn."""
     if not isinstance(edge, Arc) or math.dist(edge.start, edge.end) <= QUARTER * edge.radius:
         return [edge]
     return quarter_arcs(edge.start, edge.end, edge.centre, edge.radius, edge.sweep)
@@ -236,7 +236,7 @@ def _datum_cross() -> tuple[_Entity, _Entity]:
 
 
 def number(value: float) -> str:
-    """A decimal to a picometre, without exponent or negative zero."""
+    """Return a decimal to a picometre, without exponent or negative zero."""
     text = f"{value:.9f}".rstrip("0")
     if text.endswith("."):
         text += "0"
@@ -244,7 +244,7 @@ def number(value: float) -> str:
 
 
 def _one_line(text: str) -> str:
-    """A line break inside a value would shift every group code after it."""
+    """Return a value on one line, since a line break would shift every subsequent group code."""
     return " ".join(text.split())
 
 
@@ -270,7 +270,7 @@ SKELETON = Path(__file__).with_name("skeleton.dxf")
 def _shell() -> tuple[str, int, tuple[str, ...]]:
     """Return the owner and first handle of entities, and the packaged empty document in parts.
 
-    Between the parts go custom properties, extents, the next free handle and the entities.
+    Custom properties, extents, the next free handle and the entities go between the parts.
     """
     text = SKELETON.read_text(encoding="utf-8")
     space = re.search(r"\nBLOCK_RECORD\n  5\n(\w+)\n(?:(?!  0\n).*\n)*?\*Model_Space\n", text)
@@ -286,7 +286,7 @@ def _shell() -> tuple[str, int, tuple[str, ...]]:
 
 
 def skeleton_text() -> str:
-    """An empty R2010 document in millimetres with the cut layers and fixed metadata."""
+    """Return an empty R2010 document in millimetres with the cut layers and fixed metadata."""
     from ezdxf import options  # type: ignore[attr-defined]
     from ezdxf.filemanagement import new
 

@@ -28,11 +28,11 @@ ONE: tuple[Point, ...] = ((0.0, 0.0),)
 def fixture(
     laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
 ) -> Region | None:
-    """The base plate in the layers' own frame; None for a laminate without pins.
+    """The base plate in the layers' frame; None for a laminate without pins.
 
-    As large as the platen (mm), so that the pad rests on it all round; in its middle lie the
-    ``places``, and at each it has all holes of a laminate that is moved there. One corner is cut
-    off, at the largest x and y: it tells which way round layers and plate go.
+    It is as large as the platen (mm), so that the pad rests on it all around. The ``places`` lie in
+    its middle, each with all holes of a laminate shifted there. One corner, at the largest x and y,
+    is cut off to show the orientation of layers and plate.
     """
     return whole_plate(laminate, platen, places) if laminate.pins else None
 
@@ -40,7 +40,7 @@ def fixture(
 def whole_plate(
     laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
 ) -> Region:
-    """The base plate in the layers' own frame, without holes if the laminate has no pins."""
+    """Return the base plate in the layers' frame, without holes if the laminate has no pins."""
     x0, y0 = plate_corner(laminate, platen, places)
     width, length = _as_it_lies(platen, _lying(laminate, places))
     x1, y1 = x0 + width, y0 + length
@@ -51,14 +51,14 @@ def whole_plate(
 def plate_corner(
     laminate: Laminate, platen: tuple[float, float], places: Sequence[Point] = ONE
 ) -> Point:
-    """The plate's corner of least x and y, to 0.1 mm: the origin of its holes' coordinates."""
+    """Return the plate's corner of least x and y, to 0.1 mm: the origin of its hole coordinates."""
     box = low_x, low_y, high_x, high_y = _lying(laminate, places)
     width, length = _as_it_lies(platen, box)
     return round((low_x + high_x - width) / 2, 1), round((low_y + high_y - length) / 2, 1)
 
 
 def shown(laminate: Laminate) -> Region | None:
-    """The part of the base plate round one laminate, as pictures show it; None without pins."""
+    """Return the part of the base plate around one laminate, for pictures; None without pins."""
     if not laminate.pins:
         return None
     low_x, low_y, high_x, high_y = _lying(laminate)
@@ -70,7 +70,7 @@ def shown(laminate: Laminate) -> Region | None:
 
 
 def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]:
-    """Width and length of the plate, turned if the laminates fit only that way."""
+    """Return width and length of the plate, rotated if the laminates fit only that way."""
     wide, high = box[2] - box[0], box[3] - box[1]
     width, length = platen
     turn = (wide > width or high > length) and wide <= length and high <= width
@@ -78,7 +78,7 @@ def _as_it_lies(platen: tuple[float, float], box: Bounds) -> tuple[float, float]
 
 
 def _lying(laminate: Laminate, places: Sequence[Point] = ONE) -> Bounds:
-    """The box round the laminates on the plate."""
+    """Return the bounding box of the laminates on the plate."""
     box = laminate.bounds
     xs, ys = [x for x, _ in places], [y for _, y in places]
     return min(xs) + box[0], min(ys) + box[1], max(xs) + box[2], max(ys) + box[3]
@@ -100,10 +100,10 @@ def write_fixture(
     places: Sequence[Point] = ONE,
     notes: Sequence[str] = (),
 ) -> str | None:
-    """Writes and reads back the plate's cut file; its path in ``folder``, None without pins.
+    """Write and read back the plate's cut file; return its path in ``folder``, None without pins.
 
-    Nominal edges: the holes are to be finished to the pins. ``notes`` say how; they stand as
-    strokes on the plate, which are not cut, and in the file's properties.
+    Nominal edges: the holes are finished to the pins. ``notes`` state how, as uncut strokes on the
+    plate and in the file's properties.
     """
     plate = fixture(laminate, platen, places)
     if plate is None:
@@ -119,12 +119,12 @@ def write_fixture(
     path.write_bytes(text.encode())
     read = verify_file(path, plate, properties)
     if len(read.strokes) != 2 + len(written):
-        raise OutputError(f"{path.name}: its notes are not whole. Regenerate it.")
+        raise OutputError(f"{path.name}: its notes are incomplete. Regenerate it.")
     return PATH
 
 
 def _lettered(lines: Sequence[str], plate: Region) -> tuple[Stroke, ...]:
-    """The strokes of lines along the front edge of the plate, as large as its width lets them."""
+    """Return the strokes of lines along the plate's front edge, as large as its width allows."""
     low_x, low_y, high_x, _ = plate.bounds
     longest = max(width(line, 1.0) for line in lines)
     height = min(LETTERS, (high_x - low_x - 2 * BORDER) / longest)

@@ -1,4 +1,4 @@
-"""Kerf and chords: cuts moved into the waste by half their width, arcs drawn as safe chords."""
+"""Kerf and chords: cuts offset into the waste by half the kerf, arcs in conservative chords."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from sbafab.laminate.laminate import Laminate, Layer, Role
 
 
 def compensated_paths(laminate: Laminate, settings: CutSettings) -> dict[str, Region]:
-    """Return the path of the beam for every pattern, in chords if the cut files are in chords.
+    """Return the beam path for every pattern, in chords if the cut files use chords.
 
     Raises DesignError if the kerf leaves no path.
     """
@@ -28,7 +28,7 @@ def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
     try:
         if isinstance(kerf, tuple) and curves.in_chords:
             raise DesignError(
-                "chords do not tell how a kerf along x and y was compensated; write bulges or arcs."
+                "chords cannot represent different kerfs along x and y; write bulges or arcs."
             )
         path = compensate(shape, kerf or 0.0)
         if not curves.in_chords:
@@ -39,11 +39,11 @@ def _compensated(layer: Layer, shape: Region, settings: CutSettings) -> Region:
 
 
 def compensate(region: Region, kerf: Kerf) -> Region:
-    """The path of the beam's middle: outlines grown and holes shrunk by half of the kerf.
+    """Return the path of the beam's centre: outlines grown and holes shrunk by half the kerf.
 
-    ``kerf``: full width in mm, or that along x and along y. Of one width arcs stay arcs; of two
-    they are followed within 0.1 um, and straight edges stay straight. Raises DesignError with the
-    place if a contour vanishes, splits or merges.
+    ``kerf`` is the full width in mm, or the widths along x and y. For one width, arcs stay arcs;
+    for two they are approximated within 0.1 um, and straight edges stay straight. Raises
+    DesignError with the place if a contour vanishes, splits or merges.
     """
     if widths(kerf) == (0.0, 0.0):
         return region
@@ -79,11 +79,11 @@ edge that gives way has nothing to make up for."""
 
 
 def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) -> Region:
-    """The path of a layer (None: the base plate) with chords for arcs, within ``error`` mm of them.
+    """Return the path of a layer (None: the base plate) with chords for arcs, within ``error`` mm.
 
-    Outlines of chamber masks shrink, outlines of separator masks grow, holes open; films grow and
-    round holes open by less than FINE. Straight edges stay. Arcs of the radius ``beam``, half the
-    kerf in mm, lead round the part's corners, which stay in place.
+    Outlines of chamber masks shrink, outlines of separator masks grow, and holes widen; films grow
+    and round holes widen by less than FINE. Straight edges are unchanged. Arcs of the radius
+    ``beam``, half the kerf in mm, lead around the part's corners, which are unchanged.
     """
     is_film = role is None or not role.endswith("-mask")
     fine = min(error, FINE)
@@ -102,7 +102,7 @@ def in_chords(path: Region, role: Role | None, error: float, beam: float = 0.0) 
 
 
 def _contour(contour: Contour, grows: bool, error: float, beam: float) -> Contour:
-    """The contour as lines that leave its material no less (``grows``), or no more, anywhere."""
+    """The contour as lines that enclose at least (``grows``) or at most its material everywhere."""
     points = []
     for run in contour.runs:
         edge = run[0]

@@ -1,14 +1,14 @@
-"""Film sheets as files of laser programs: a row a program, each written and read back.
+"""Film sheets as files of laser programs: one row per program, each written and read back.
 
-LightBurn's format (``.lbrn2``) is not documented; only elements found in files that LightBurn saved
-are written. It has lines, cubic Bezier curves and ellipses, so an arc becomes Bezier curves of at
-most 45 degrees, which deviate from it by 4e-6 of its radius.
+LightBurn's format (``.lbrn2``) is undocumented; only elements found in files saved by LightBurn are
+written. It has lines, cubic Bezier curves and ellipses, so an arc becomes Bezier curves of at most
+45 degrees, with a deviation of 4e-6 of its radius.
 
-RDWorks (Ruida controllers) makes a layer of each colour of a drawing; its file is the oldest DXF,
-R12, in which every entity has its colour, and polylines their arcs as bulges. Epilog's software
-cuts a line if it is a hairline, 0.001 in wide, and maps red, green and blue to settings; its file
-is an SVG in millimetres. Neither file has the sheet's frame, since these programs cut every line.
-Both files follow general knowledge of the programs, which have not been run.
+RDWorks (Ruida controllers) makes a layer of each colour of a drawing; its file is DXF R12, the
+oldest, with a colour on every entity and arcs as bulges of polylines. Epilog's software cuts lines
+that are hairlines, 0.001 in wide, and maps red, green and blue to settings; its file is an SVG in
+millimetres. Neither file has the sheet's frame, since these programs cut every line. Both files
+follow general knowledge of the programs and have not been tested with them.
 """
 
 from __future__ import annotations
@@ -51,10 +51,7 @@ NONE: Mapping[Any, Any] = MappingProxyType({})
 
 
 class LaserSheet(NamedTuple):
-    """What the file of a film sheet is made of: the beam's runs in order, and its size in mm.
-
-    ``recipes`` give power and speed, and ``notes`` inform the user, if a file can hold them.
-    """
+    """The content of a film sheet's file: the beam's runs in order, and the sheet size in mm."""
 
     runs: Sequence[LaserRun]
     size: Point
@@ -64,7 +61,7 @@ class LaserSheet(NamedTuple):
 
 
 class LaserReading(NamedTuple):
-    """A file read back: its runs in order, and the settings of each layer if it holds any."""
+    """A file read back: its runs in order, and each layer's settings if the file holds any."""
 
     runs: list[BeamRun]
     settings: Settings = NONE
@@ -101,7 +98,7 @@ ADVICE = f"Powers are 0: set power and speed of each layer for this film. {CHECK
 
 
 def laser_notes(settings: CutSettings, material: Material, properties: Mapping[str, str]) -> str:
-    """Return the notes of a film's file: which powers are set, their source, and its properties."""
+    """The notes of a film's file: the powers that are set, their source, and its properties."""
     advice = ADVICE if settings.machine is None else _recipe_notes(settings, material)
     return "\n".join((advice, *(f"{name}: {value}" for name, value in properties.items())))
 
@@ -126,9 +123,9 @@ def _recipe_notes(settings: CutSettings, material: Material) -> str:
 
 
 def _lightburn_settings(sheet: LaserSheet) -> dict[str, dict[str, str]]:
-    """Return the settings of the layers that a sheet has; power and speed only by a recipe.
+    """Return the settings of the layers on a sheet; power and speed only from a recipe.
 
-    A power of 0 fires nothing, where one left out is the reader's guess.
+    A power of 0 never fires, while a missing power is left to the reader.
     """
     used = {run.layer for run in sheet.runs}
     settings = {}
@@ -210,7 +207,7 @@ def _lightburn_shape(serial: int, run: LaserRun) -> str:
 
 
 class Bezier(NamedTuple):
-    """A cubic curve with its two inner control points; a line without them."""
+    """A cubic curve with its two inner control points; a line if it has none."""
 
     start: Point
     handles: tuple[Point, ...]
@@ -226,7 +223,7 @@ class Bezier(NamedTuple):
 
 
 def _short_arcs(edge: Edge) -> Sequence[Edge]:
-    """Return the edge, or the pieces of an arc that become a curve each."""
+    """Return the edge, or an arc split into pieces that become one curve each."""
     if isinstance(edge, Line):
         return (edge,)
     count = max(1, math.ceil(abs(edge.sweep) / MOST_TURN - 1e-9))
@@ -235,7 +232,7 @@ def _short_arcs(edge: Edge) -> Sequence[Edge]:
 
 
 def _bezier(edge: Edge) -> Bezier:
-    """Return the curve that stands for a short arc, or the line."""
+    """Return the curve that approximates a short arc, or the line."""
     if not isinstance(edge, Arc):
         return Bezier(edge.start, (), edge.end)
     reach = 4 / 3 * math.tan(abs(edge.sweep) / 4) * edge.radius
@@ -253,10 +250,10 @@ _PLACE = re.compile(rf"1 0 0 1 ({_NUM}) ({_NUM})")
 
 
 def _read_lightburn(path: Path) -> LaserReading:
-    """Return a project as this program writes it. Raises OutputError for any other file."""
+    """Return a project in this program's format. Raises OutputError for any other file."""
     root = ElementTree.parse(path).getroot()
     if root.tag != "LightBurnProject":
-        raise OutputError("it is no LightBurn project")
+        raise OutputError("it is not a LightBurn project")
     if (root.get("MirrorX"), root.get("MirrorY")) != ("False", "False"):
         raise OutputError("it is mirrored")
     layers = {str(index): layer for layer, index in INDICES.items()}
@@ -274,14 +271,14 @@ def _read_lightburn(path: Path) -> LaserReading:
 def _read_shape(item: ElementTree.Element) -> Iterator[BeamCurve]:
     place = _PLACE.fullmatch(item.findtext("XForm") or "")
     if place is None:
-        raise OutputError("it turns or stretches a shape")
+        raise OutputError("it rotates or scales a shape")
     x, y = float(place[1]), float(place[2])
     kind = item.get("Type")
     if kind == "Ellipse" and item.get("Rx") == item.get("Ry"):
         yield from circle((x, y), float(item.get("Rx", ""))).edges
         return
     if kind != "Path":
-        raise OutputError(f"it holds a shape of the type {kind} that no sheet has")
+        raise OutputError(f"it holds a shape of type {kind}, which sheets do not use")
 
     def point(u: str, v: str) -> Point:
         return x + float(u), y + float(v)
@@ -292,7 +289,7 @@ def _read_shape(item: ElementTree.Element) -> Iterator[BeamCurve]:
         leaving, coming = vertices[int(first)], vertices[int(last)]
         start = point(*leaving[:2])
         if end not in (None, start):
-            raise OutputError("a path falls apart")
+            raise OutputError("a path is not continuous")
         end = point(*coming[:2])
         handles = () if curve == "L" else (point(*leaving[2:4]), point(*coming[4:6]))
         yield Bezier(start, handles, end)
@@ -304,7 +301,7 @@ def _matches(pattern: re.Pattern[str], text: str) -> list[tuple[str, ...]]:
     """Return the matches of a pattern. Raises OutputError if the text holds anything else."""
     rest = pattern.sub("", text)
     if rest:
-        raise OutputError(f"it says {rest[:20]!r} in a path")
+        raise OutputError(f"it has {rest[:20]!r} in a path")
     return [match.groups("") for match in pattern.finditer(text)]
 
 
@@ -362,10 +359,10 @@ def _r12_entity(run: LaserRun) -> str:
 
 
 def _read_rdworks(path: Path) -> LaserReading:
-    """Return a DXF as ezdxf reads it, its layers by the colour of each entity.
+    """Return a DXF as ezdxf reads it, with layers by entity colour.
 
-    Its polylines may be of a later DXF than was written. It names no unit, which RDWorks takes for
-    mm, or mm.
+    Its polylines may be of a later DXF version than written. Its unit is mm or unstated, which
+    RDWorks takes as mm.
     """
     from ezdxf.filemanagement import readfile
     from ezdxf.lldxf.const import BYLAYER, DXFError
@@ -384,7 +381,7 @@ def _read_rdworks(path: Path) -> LaserReading:
         if colour == BYLAYER and entity.dxf.layer in document.layers:
             colour = abs(document.layers.get(entity.dxf.layer).dxf.color)
         if colour not in layers:
-            raise OutputError(f"a line has the colour {colour}, which no layer has")
+            raise OutputError(f"a line has colour {colour}, which does not belong to a layer")
         runs.append(BeamRun(layers[colour], drawn_entity(entity, may_be_open=True).edges))
     return LaserReading(runs)
 
@@ -405,7 +402,7 @@ def svg_text(runs: Iterable[LaserRun], size: Point, title: str, stroke: float = 
     """Return runs as an SVG on a page of a size in mm: a group for each layer, with true arcs.
 
     The page's lower left corner is the origin; coordinates have no transforms. The beam follows the
-    middle of a line, which is ``stroke`` mm wide.
+    centre of a line, which is ``stroke`` mm wide.
     """
     by_layer: dict[str, list[LaserRun]] = {layer: [] for layer in RGB}
     for run in runs:
@@ -433,7 +430,7 @@ def _svg_shape(run: LaserRun, height: float) -> str:
 
 
 def _turned_over(edge: Edge, height: float) -> Edge:
-    """Return the edge with y downwards, from an upper edge at ``height``."""
+    """Return the edge with y downwards, measured from an upper edge at ``height``."""
 
     def flip(p: Point) -> Point:
         return p[0], height - p[1]
@@ -463,7 +460,7 @@ class _SvgCurve(NamedTuple):
 
 
 def _read_epilog(path: Path) -> LaserReading:
-    """Read an SVG with svgelements; the colour of its strokes tells the layers apart."""
+    """Read an SVG with svgelements; stroke colours identify the layers."""
     from svgelements import Close
     from svgelements import Path as SvgPath
 
@@ -477,7 +474,7 @@ def _read_epilog(path: Path) -> LaserReading:
         layer = layers.get(group.get("stroke", ""))
         if layer is None or group.get("stroke-width") != f"{HAIRLINE:g}":
             name = group.get("id")
-            raise OutputError(f"lines of {name} are not hairlines in the colour of a layer")
+            raise OutputError(f"the lines of {name} are not hairlines in a layer colour")
         for shape in group:
             curves: Sequence[BeamCurve]
             if shape.tag == f"{SVG}circle":
@@ -499,10 +496,10 @@ def _read_epilog(path: Path) -> LaserReading:
 
 
 class LaserProgram(NamedTuple):
-    """The file of a laser program: its name's end after the sheet's name, its writer and reader.
+    """A laser program's file: its name suffix, its writer and its reader.
 
     ``settings`` returns the settings that a file must hold. Without ``has_frame`` the program would
-    cut the sheet's frame, which is left out.
+    cut the sheet's frame, so it is omitted.
     """
 
     ending: str
@@ -512,7 +509,7 @@ class LaserProgram(NamedTuple):
     has_frame: bool = False
 
     def drawn(self, sheet: LaserSheet) -> LaserSheet:
-        """Return what the file holds of a sheet."""
+        """Return the parts of a sheet that the file holds."""
         runs = [run for run in sheet.runs if self.has_frame or run.layer != REFERENCE]
         return sheet._replace(runs=runs)
 
@@ -532,7 +529,7 @@ def laser_text(program: str, sheet: LaserSheet) -> str:
 
 
 def read_laser_file(path: Path, program: str) -> LaserReading:
-    """Return a file of a laser program as it stands. Raises OutputError."""
+    """Return the content of a laser program's file. Raises OutputError."""
     try:
         return PROGRAMS[program].read(path)
     except OutputError as error:
@@ -563,7 +560,7 @@ def _settings_difference(read: Settings, expected: Settings) -> str:
 
 
 def rdworks_difference(path: Path, expected: Path) -> str:
-    """Return text on an RDWorks file's difference from the expected one; "" if it cuts the same.
+    """Return the difference of an RDWorks file from the expected one; "" if it cuts the same.
 
     Raises OutputError if the file cannot be read.
     """

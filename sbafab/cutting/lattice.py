@@ -1,8 +1,8 @@
-"""Lattices of one shape on a film sheet: rows of copies, straight, offset, or turned by half.
+"""Lattices of one shape on a film sheet: rows of copies, straight, offset, or rotated 180 degrees.
 
 Copies are apart if outlines grown by half the spacing do not meet. The least distance of two copies
 along an axis follows from envelopes: it is the maximum, over the other coordinate, of the front of
-one less the back of the other. Lattices are ranked by a table of these distances and laid by the
+one minus the back of the other. Lattices are ranked by a table of these distances and placed by the
 exact distances.
 """
 
@@ -53,9 +53,9 @@ _Value = Any
 
 
 class Lattice(NamedTuple):
-    """Places of copies of one shape on an empty sheet, the lowest first: turn and shift in mm.
+    """Places of copies of one shape on an empty sheet, lowest first: rotation and shift in mm.
 
-    ``top`` is the highest y that they reach; ``is_pair`` is true of two lattices side by side.
+    ``top`` is their highest y; ``is_pair`` is true for two lattices side by side.
     """
 
     places: tuple[tuple[Turn, Point], ...]
@@ -66,10 +66,10 @@ class Lattice(NamedTuple):
 def lattices_of(
     shape: Region, spacing: float, area: Bounds, turns: Sequence[Turn]
 ) -> list[Lattice]:
-    """Return the lattices that hold most copies of a shape in ``area``, the best first.
+    """Return the lattices with the most copies of a shape in ``area``, best first.
 
-    Copies are ``spacing`` mm apart, and turned by ``turns`` alone. Where few fit, a lattice may be
-    two, one beside the other.
+    Copies are ``spacing`` mm apart, and rotated only by ``turns``. If few fit, a lattice may
+    combine two, side by side.
     """
     rows = tuple(_Rows(shape, base, spacing) for base in TURNS[:2])
     laid = list(_laid_in(rows, area, turns))
@@ -79,12 +79,12 @@ def lattices_of(
 
 
 def most_copies(lattice: Lattice) -> tuple[int, float]:
-    """Sort key: most copies, then least length."""
+    """Return a sort key: most copies, then least length."""
     return -len(lattice.places), round(lattice.top, 3)
 
 
 def _laid_in(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
-    """Yield lattices of a shape, as it is drawn and turned, in ``area``."""
+    """Yield lattices of a shape, as drawn and rotated, in ``area``."""
     low_x, low_y, high_x, high_y = area
     width, length = high_x - low_x, high_y - low_y
     for base, in_turn in zip(TURNS, rows, strict=False):
@@ -102,7 +102,7 @@ def _laid_in(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iter
 
 
 def _pairs(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterator[Lattice]:
-    """Yield pairs of lattices: one leaves a strip as wide as one copy, another fills the strip."""
+    """Yield pairs of lattices: one leaves a strip as wide as one copy, one fills the strip."""
     shape, spacing = rows[0].shape, rows[0].spacing
     low_x, low_y, high_x, high_y = area
     # On a square, a strip on top is one at the side, turned.
@@ -124,7 +124,7 @@ def _pairs(rows: Sequence[_Rows], area: Bounds, turns: Sequence[Turn]) -> Iterat
 
 
 def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
-    """Return the copies of a shape, the lowest first."""
+    """Return the copies of a shape, lowest first."""
     tops = {
         turn: placed(shape, turn, (0.0, 0.0)).bounds[3] for turn in {turn for turn, _ in places}
     }
@@ -134,7 +134,7 @@ def lattice_of(shape: Region, places: Sequence[tuple[Turn, Point]]) -> Lattice:
 
 
 class _Copy(NamedTuple):
-    """A copy in a row: 1 if it is turned by half, else 0, and its shift in mm."""
+    """A copy in a row: 1 if rotated 180 degrees, else 0, and its shift in mm."""
 
     half: int
     x: _Value
@@ -149,14 +149,14 @@ class _Row(NamedTuple):
 
 
 class _Pattern(NamedTuple):
-    """Rows that repeat upward; each begins one of ``steps`` mm to the right of that below it."""
+    """Rows that repeat upward; each starts one of ``steps`` mm to the right of the row below."""
 
     rows: tuple[_Row, ...]
     steps: tuple[_Value, ...]
 
 
 class _Rows:
-    """Rows along x of a shape in a turn and in its half turn."""
+    """Rows along x of a shape in two orientations, 180 degrees apart."""
 
     def __init__(self, shape: Region, turn: Turn, spacing: float) -> None:
         self.shape, self.spacing = shape, spacing
@@ -179,7 +179,7 @@ class _Rows:
 
     @cached_property
     def is_symmetric(self) -> bool:
-        """True if the half turn is the shape itself, moved."""
+        """True if the rotated shape equals the shape itself, shifted."""
         first, second = (
             np.concatenate([side.levels, side.front, side.back]) for side in self.upright
         )
@@ -188,15 +188,15 @@ class _Rows:
     # How near copies and rows come.
 
     def beside(self, first: int, second: int, rise: Numbers) -> Numbers:
-        """Return how far right of the first copy the second, ``rise`` mm higher, must lie."""
+        """The least distance of the second copy, ``rise`` mm higher, to the right of the first."""
         return _slides(self.upright[first], self.upright[second], rise)
 
     def above(self, first: int, second: int, right: Numbers) -> Numbers:
-        """Return how far above the first copy the second, ``right`` mm to the right, must lie."""
+        """The least height of the second copy, ``right`` mm to the right, above the first."""
         return _slides(self.lying[first], self.lying[second], right)
 
     def climb(self, low: _Row, high: _Row, right: float) -> float:
-        """Return how far above a row another, ``right`` mm to the right, must lie."""
+        """Return the least height of a row, ``right`` mm to the right, above another."""
         key = low, high, round(right % low.pitch, 9)
         if key not in self._known:
             heights = []
@@ -210,7 +210,7 @@ class _Rows:
         return self._known[key]
 
     def _ranked_climb(self, low: _Row, high: _Row, right: Numbers) -> Numbers:
-        """Return about what ``climb`` does, for arrays of rows."""
+        """Return approximate values of ``climb`` for arrays of rows."""
         best = np.full(np.shape(right), -math.inf)
         reach = math.ceil(self.reach[0] / np.min(low.pitch))
         places, table = self._table
@@ -223,7 +223,7 @@ class _Rows:
 
     @cached_property
     def _table(self) -> tuple[Numbers, dict[tuple[int, int], Numbers]]:
-        """Offsets to the right, and the least heights of one copy above another there."""
+        """Return offsets to the right, and the least heights of one copy above another at each."""
         width = self.reach[0] - 1e-6
         places = np.linspace(-width, width, TABLE)
         same_shape = self.above(0, 0, places)
@@ -234,7 +234,7 @@ class _Rows:
     # The patterns that are tried.
 
     def layouts(self, box: tuple[float, float]) -> list[list[tuple[Turn, Point]]]:
-        """Return the copies of the patterns that promise most, in a box from the origin.
+        """Return the copies of the most promising patterns, in a box from the origin.
 
         Returns one layout without copies if the box is too small for any.
         """
@@ -249,7 +249,7 @@ class _Rows:
         return [self._laid(pattern, box) for _, pattern in ranked[:PROMISING]]
 
     def _families(self) -> Iterator[_Pattern]:
-        """Yield patterns with arrays of numbers: of rows alike, in turn by half, and of pairs."""
+        """Yield patterns with arrays of numbers: equal rows, alternating rows, and pairs."""
         origin, pitch = np.array(0.0), np.array(self.beside(0, 0, np.zeros(1))[0])
         upright = _Row((_Copy(0, origin, origin),), pitch)
         steps = np.linspace(0.0, float(pitch), STEPS, endpoint=False)
@@ -300,7 +300,7 @@ class _Rows:
         return counts
 
     def _laid(self, pattern: _Pattern, box: tuple[float, float]) -> list[tuple[Turn, Point]]:
-        """Return the copies of a pattern that lie in a box from the origin."""
+        """Return the copies of a pattern inside a box from the origin."""
         copies: list[tuple[Turn, Point]] = []
         right, up = 0.0, -min(copy.y for copy in pattern.rows[0].copies)
         below: list[tuple[_Row, float, float]] = []
@@ -330,7 +330,7 @@ class _Rows:
 
 
 def _member(family: _Pattern, number: int) -> _Pattern:
-    """Return a pattern of a family that has arrays for numbers."""
+    """Return one pattern of a family with arrays of numbers."""
 
     def chosen(values: Numbers) -> float:
         return float(values if values.ndim == 0 else values[number])
@@ -354,7 +354,7 @@ class _Sides(NamedTuple):
 
 
 def _sides(polygon: Numbers) -> _Sides:
-    """Return the sides of a polygon along its first coordinate, by its second."""
+    """Return the sides of a polygon along its first coordinate, as functions of its second."""
     starts, ends = polygon, np.roll(polygon, -1, axis=0)
     corners = np.unique(polygon[:, 1])
     corners = corners[np.concatenate([[True], np.diff(corners) > 8 * LEVEL])]
@@ -377,7 +377,7 @@ def _sides(polygon: Numbers) -> _Sides:
 def _slides(first: _Sides, second: _Sides, offsets: Numbers) -> Numbers:
     """Return the distance along the axis at which the second polygon clears the first.
 
-    It is moved across by each offset; -inf where they then pass each other.
+    It is shifted across the axis by each offset; -inf if the polygons then miss each other.
     """
     shifts = offsets[:, None]
     beside = 2 * LEVEL * np.resize([1.0, -1.0], len(first.levels))

@@ -1,9 +1,9 @@
-"""The cut files of a laminate: one a layer, each distinct pattern verified once; and of its seams.
+"""The cut files of a laminate: one per layer, each distinct pattern verified once, and those of its
+seams.
 
-A seam's file has the path that the middle of a tool follows, on the layer SEAM, and nothing else is
-cut; the tool bonds half of its width on both sides of it. Coordinates are in mm, as in the layer
-files. If a tool is mounted beside its machine's head, its file is for the head: shifted by minus
-the tool's offset, which the file states.
+A seam's file has only the path of the tool's centre, on the layer SEAM; the tool bonds half of its
+width on both sides. Coordinates are in mm, as in the layer files. If a tool is mounted beside its
+machine's head, the file is for the head: shifted by minus the tool's offset, which the file states.
 """
 
 from __future__ import annotations
@@ -101,8 +101,10 @@ def seam_properties(seam: Seam, settings: CutSettings) -> dict[str, str]:
 
 
 def write_seam_files(laminate: Laminate, folder: Path, settings: CutSettings) -> None:
-    """Writes the path of every seam under ``folder``. Raises OutputError if a file does not
-    read back as its path, OSError if it cannot be written.
+    """Write the path of every seam under ``folder``.
+
+    Raises OutputError if a file does not match its path when read back, OSError if it cannot be
+    written.
     """
     for seam in laminate.seams:
         path = folder / seam_path(seam)
@@ -125,7 +127,7 @@ def moved(chains: Chains, by: Point) -> tuple[tuple[Edge, ...], ...]:
 
 
 def shift_words(tool: str, offset: Point) -> str:
-    """Return the sentence that the files of a tool are shifted, with the distance."""
+    """Return the sentence about the shift of a tool's files, with the distance."""
     x, y = offset
     return f"files of the {tool} are shifted by {0.0 - x:.2f}, {0.0 - y:.2f} mm"
 
@@ -139,7 +141,7 @@ def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]
     strangers = [layer for layer, _ in drawing.strokes if layer not in (SEAM, REFERENCE)]
     if strangers or not drawing.region.is_empty:
         raise OutputError(
-            f"{path.name}: it holds more than a path on {SEAM}; remove what is on "
+            f"{path.name}: it holds more than a path on {SEAM}; remove the content of "
             f"{strangers[0] if strangers else 'the layers of cuts'}, or regenerate it"
         )
     chains = tuple(edges for layer, edges in drawing.strokes if layer == SEAM)
@@ -149,7 +151,7 @@ def read_seam(path: Path) -> tuple[tuple[tuple[Edge, ...], ...], dict[str, str]]
 
 
 def path_difference(chains: Chains, expected: Chains) -> str | None:
-    """Return text on a path's deviation from the expected one; None within a micrometre."""
+    """A description of a path's deviation from the expected one; None within a micrometre."""
     if len(chains) != len(expected):
         return f"it has {len(chains)} paths, not {len(expected)}"
     worst: tuple[float, Point] = (0.0, (0.0, 0.0))
@@ -162,7 +164,7 @@ def path_difference(chains: Chains, expected: Chains) -> str | None:
 
 
 def stated_width(properties: Mapping[str, str]) -> float | None:
-    """Return the width of the tool that a seam's file states, mm, or None."""
+    """Return the tool width stated in a seam's file, mm, or None."""
     try:
         width = float(properties.get(WIDTH, ""))
     except ValueError:

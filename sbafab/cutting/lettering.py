@@ -1,7 +1,7 @@
-"""Single-stroke letters, for labels that a laser engraves or a reader of a drawing sees.
+"""Single-stroke letters, for labels engraved by a laser or read in a drawing.
 
-Every glyph is drawn on a grid of 4 by 6: strokes apart by blanks, each a run of points, a digit
-for x and one for y.
+Every glyph is drawn on a 4 by 6 grid: strokes separated by blanks, each a run of points, with one
+digit for x and one for y.
 """
 
 from __future__ import annotations
@@ -66,9 +66,9 @@ GLYPHS = {
 
 
 def strokes(text: str, at: Point, height: float) -> tuple[Stroke, ...]:
-    """The strokes of a line of text, its lower left corner ``at``, capitals ``height`` mm high.
+    """Return the strokes of a line of text: lower left corner ``at``, capitals ``height`` mm high.
 
-    Small letters become capitals; a character without a glyph leaves a gap.
+    Lower case letters become capitals; a character without a glyph leaves a gap.
     """
     step = height / CAP_HEIGHT
     return tuple(

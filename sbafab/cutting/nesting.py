@@ -1,4 +1,4 @@
-"""Nesting: every part of each material on as few sheets as an engine finds."""
+"""Nesting: every part of each material on as few sheets as possible."""
 
 from __future__ import annotations
 
@@ -100,9 +100,9 @@ def as_dict(nests: Sequence[Nest]) -> dict[str, Any]:
 def from_dict(
     data: Any, parts: Sequence[NestPart], stocks: Mapping[Material, Stock]
 ) -> tuple[Nest, ...] | None:
-    """Return the saved nests if they were made of these parts and stocks; otherwise None.
+    """Return the saved nests if their parts and stocks match; otherwise None.
 
-    The placements are not checked here, but in ``check_nest``.
+    ``check_nest`` checks the placements.
     """
     nests = []
     try:
@@ -119,14 +119,14 @@ def from_dict(
 
 
 def _placement(part: Any, sheet: Any, turn: Any, x: Any, y: Any) -> Placement:
-    """Return the placement of a saved row. Raises TypeError or ValueError for another row."""
+    """Return the placement of a saved row. Raises TypeError or ValueError for an invalid row."""
     if not (type(part) is type(sheet) is int and sheet >= 0 and math.isfinite(x + y)):
         raise ValueError
     return Placement(part, sheet, TURNS[TURNS.index(turn)], (float(x), float(y)))
 
 
 def _key(nests: Sequence[Nest]) -> str:
-    """Return a hash of the nesting's inputs and of the methods tried: lattices and arrangements."""
+    """Return a hash of the nesting's inputs and methods: lattices and arrangements."""
     inputs = [
         (
             "bottom-left, lattices, pairs of lattices, arrangements"

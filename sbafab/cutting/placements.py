@@ -37,9 +37,9 @@ TURNS: tuple[Turn, ...] = (0, 1, 2, 3)
 
 @dataclass(frozen=True)
 class NestPart:
-    """One piece that is to be cut ``count`` times.
+    """One piece to be cut ``count`` times.
 
-    ``region`` is the path of the beam, kerf compensated, in the frame of its layer; ``design`` and
+    ``region`` is the kerf-compensated path of the beam, in the frame of its layer; ``design`` and
     ``pattern`` name its source, ``piece`` its number (from 1) if the pattern has several pieces.
     """
 
@@ -56,8 +56,9 @@ class NestPart:
 
 
 class Stock(Sheet):
-    """Film to cut from, and the ``turns`` that parts may take on it: a path that is compensated for
-    different kerfs along x and along y keeps its axes.
+    """Film to cut from, and the rotations ``turns`` that parts may have on it.
+
+    A path compensated for different kerfs along x and y keeps its axes.
     """
 
     turns: tuple[Turn, ...] = TURNS
@@ -72,7 +73,7 @@ class Stock(Sheet):
 class Placement:
     """A part on a sheet: its region turned by ``turn`` about the origin, then moved by ``shift``.
 
-    ``part`` is an index into the parts that were nested; sheets count from 0.
+    ``part`` is an index into the nested parts; sheets count from 0.
     """
 
     part: int
@@ -83,7 +84,7 @@ class Placement:
 
 @dataclass(frozen=True)
 class Nest:
-    """The places of all parts of one material; ``placements`` have no order."""
+    """The places of all parts of one material; ``placements`` are unordered."""
 
     material: Material
     stock: Stock
@@ -98,7 +99,7 @@ class Nest:
         return [placement for placement in self.placements if placement.sheet == sheet]
 
     def length(self, sheet: int) -> float:
-        """Return the sheet's length: a roll is cut off one border past the last part."""
+        """Return the sheet's length: a roll is cut off one border width beyond the last part."""
         if not self.stock.roll:
             return self.stock.length
         tops = (self.region(placement).bounds[3] for placement in self.on_sheet(sheet))
@@ -117,7 +118,7 @@ class Nest:
 
 
 def placed(region: Region, turn: Turn, shift: Point) -> Region:
-    """Return a region turned by exact quarter turns about the origin and then moved."""
+    """Return a region rotated by exact quarter turns about the origin and then shifted."""
     (c, s), (dx, dy) = unit(90.0 * turn), shift
     for contour in region.contours:
         # Computed here once instead of for every place.
@@ -133,9 +134,9 @@ def parts_of(
 ) -> tuple[NestPart, ...]:
     """Return every piece of every pattern, by pattern in stacking order.
 
-    ``paths`` holds each pattern's path of the beam, kerf compensated; ``spares`` returns
-    the number of a pattern's spare pieces beyond the ``copies``. Pieces of one pattern that differ
-    only in their place are one part, named after the first of them.
+    ``paths`` holds each pattern's kerf-compensated beam path; ``spares`` returns the number of a
+    pattern's spare pieces beyond the ``copies``. Pieces of one pattern that differ only in position
+    are one part, named after the first.
     """
     parts: list[NestPart] = []
     for pattern, layers in laminate.patterns.items():
@@ -191,9 +192,9 @@ def check_nest(nest: Nest) -> None:
 
 
 def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: float = SLACK) -> None:
-    """Check named regions on a sheet for its border and spacing. Raises OutputError.
+    """Check border and spacing of named regions on a sheet. Raises OutputError.
 
-    ``slack`` mm may be missing: the rounding of the numbers in a file.
+    The tolerance ``slack`` in mm allows for rounding of the numbers in a file.
     """
     min_x, min_y, max_x, max_y = stock.usable
     for name, region in regions:
@@ -202,7 +203,7 @@ def check_placed(regions: Sequence[tuple[str, Region]], stock: Stock, slack: flo
         if over > slack:
             x, y = (low_x + high_x) / 2, (low_y + high_y) / 2
             raise OutputError(
-                f"{name} at x {x:.3f}, y {y:.3f} reaches {over:.4f} mm into the border of "
+                f"{name} at x {x:.3f}, y {y:.3f} extends {over:.4f} mm into the border of "
                 f"{stock.border:g} mm; nest again."
             )
     # A part in another's hole would drop out with the waste: holes are cut first.
@@ -244,7 +245,7 @@ def least_distance(a: Region, b: Region, beyond: float) -> Gap:
 
 
 def edge_distance(a: Edge, b: Edge) -> Gap:
-    """The least distance between two edges and the place on ``a``, or their meeting point."""
+    """Return the least distance between two edges and the point on ``a``, or their intersection."""
     touching = meeting_points(a, b)
     if touching:
         return Gap(0.0, touching[0])

@@ -1,4 +1,4 @@
-"""The order in which contours are cut: inner before outer, short travel, heat spread; its time."""
+"""The cutting order of contours: inner before outer, short travel, spread heat; and its time."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ SHORTER = 1e-6
 
 
 def cutting_sequence(region: Region, heat_distance: float = 0.0) -> tuple[Contour, ...]:
-    """Holes first, then outlines, each time on to the nearest start, from the origin.
+    """Return holes first, then outlines, each followed by the nearest start, from the origin.
 
-    Contours nearer to each other than ``heat_distance`` mm do not follow each other, as far as
-    others are left to cut in between.
+    Contours closer than ``heat_distance`` mm are not cut consecutively while others remain to be
+    cut in between.
     """
     holes = _short(region.holes, ORIGIN)
     here = _start(holes[-1]) if holes else ORIGIN
@@ -34,15 +34,15 @@ def cutting_sequence(region: Region, heat_distance: float = 0.0) -> tuple[Contou
 
 
 def travel(contours: Iterable[Contour]) -> float:
-    """Mm that the head moves from the origin to each contour, which ends where it starts."""
+    """The travel of the head in mm from the origin to each contour, which ends where it starts."""
     stops = [ORIGIN, *map(_start, contours)]
     return sum(math.dist(a, b) for a, b in pairwise(stops))
 
 
 def cutting_minutes(cuts: int, cut_length: float, moved: float, laser: Laser) -> float:
-    """Return the minutes that cuts and travel (mm) take.
+    """Return the minutes for cuts and travel (mm).
 
-    Engraving and the way to the cut that frees a roll's sheet are left out.
+    Engraving and the travel to a roll's parting cut are excluded.
     """
     seconds = (
         cut_length / laser.cut_speed + moved / laser.travel_speed + cuts * laser.pierce_seconds
@@ -55,7 +55,7 @@ def _start(contour: Contour) -> Point:
 
 
 def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
-    """A short path through all contours: on to the nearest, then crossings undone."""
+    """Return a short path through all contours: nearest neighbours, then without crossings."""
     rest = list(contours)
     starts = np.array([_start(contour) for contour in rest], dtype=float).reshape(-1, 2)
     path: list[Contour] = []
@@ -73,7 +73,7 @@ def _short(contours: Iterable[Contour], here: Point) -> list[Contour]:
 
 
 def _undo_crossings(path: list[Contour], here: Point) -> bool:
-    """Turns stretches of the path round wherever that shortens it (2-opt)."""
+    """Reverse stretches of the path wherever that shortens it (2-opt)."""
     shorter = False
     stops = [here, *map(_start, path)]
     count = len(path)
@@ -97,7 +97,7 @@ def _undo_crossings(path: list[Contour], here: Point) -> bool:
 
 
 def _spread(path: Sequence[Contour], heat_distance: float) -> list[Contour]:
-    """Return the path with the next contour that is not near the last one, time after time."""
+    """Return the path in which each next contour is, if possible, not close to the last."""
     rest = list(path)
     spread: list[Contour] = []
     while rest:

@@ -47,13 +47,13 @@ LabelState = Literal["engraved", "no room", "off"]
 class SheetFile:
     """One written sheet: paths relative to the output folder, lengths in mm, area in mm2.
 
-    ``number`` counts from 1 within the material, and is the nest's sheet plus one. ``counts``
-    says how many parts of each design and pattern lie on it: (design, pattern, count).
-    ``unsorted_travel`` is the head's travel in the nest's own order. ``label`` states whether the
-    sheet's label is engraved, did not fit the border, or was not requested. ``cut_length`` includes
-    the cut that frees a roll's sheet; ``contours`` counts the parts' contours.
-    ``index_marks`` is the number of parts with their number engraved beside them; None if not
-    requested. ``machine_file`` is the file for a laser program other than LightBurn, if requested.
+    ``number`` counts from 1 within the material, and is the nest's sheet plus one. ``counts`` holds
+    the number of parts of each design and pattern: (design, pattern, count). ``unsorted_travel`` is
+    the head's travel in the nest's own order. ``label`` states whether the sheet's label is
+    engraved, did not fit the border, or was not requested. ``cut_length`` includes the cut that
+    frees a roll's sheet; ``contours`` counts the parts' contours. ``index_marks`` is the number of
+    parts with their number engraved beside them; None if not requested. ``machine_file`` is the
+    file for a laser program other than LightBurn, if requested.
     """
 
     path: str
@@ -81,7 +81,7 @@ class SheetFile:
 
     @property
     def density(self) -> float:
-        """Share of the sheet's whole area that becomes parts."""
+        """The fraction of the sheet's area that becomes parts."""
         return self.parts_area / (self.width * self.length)
 
 
@@ -93,7 +93,7 @@ def write_sheets(
     sheets: Sheets,
     progress: Counted | None = None,
 ) -> list[SheetFile]:
-    """Writes ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
+    """Write ``sheets/<material>_<number>.dxf``, ``.lbrn2`` and ``.svg`` of every sheet.
 
     Each file is read back and its contours are compared with the nest. The check of the whole
     folder tests that they lie inside the border, apart from each other and clear of pins. Raises
@@ -199,7 +199,7 @@ ONE_LINE, SEVERAL_LINES = 0.5, 0.7
 
 
 def _sheet_label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[Stroke, ...]:
-    """Return the engraving of the border, if there is room for it between the pins."""
+    """Return the engraving of the border, if it fits between the pins."""
     kerf = kerf_suffix(settings.kerf_width(nest.material)).strip("_") or "kerf none"
     waived = f" waived: {', '.join(settings.waived)}" if settings.waived else ""
     lowered = f" limits: {', '.join(settings.lowered)}" if settings.lowered else ""
@@ -211,9 +211,9 @@ def _sheet_label(nest: Nest, sheet: int, settings: CutSettings) -> tuple[Stroke,
 
 
 class _Margin(NamedTuple):
-    """A strip of border: its reading direction runs from ``corner`` along x, or along y upward.
+    """A strip of border, read from ``corner`` along x, or along y upward.
 
-    Lines are ``room`` long at most and stand over each other away from ``corner``.
+    Lines are at most ``room`` long and are stacked away from ``corner``.
     """
 
     corner: Point
@@ -228,7 +228,7 @@ class _Margin(NamedTuple):
 def label(text: str, stock: Stock, length: float) -> tuple[Stroke, ...]:
     """Return the strokes of a sheet's label; empty if it does not fit the border.
 
-    In one line along the lower edge if it fits, else along another, else in up to three lines.
+    It is one line along the lower edge if it fits, else along another edge, else up to three lines.
     """
     edge = stock.border
     along, up = stock.width - 2 * edge, length - 2 * edge
@@ -265,7 +265,7 @@ def _written(lines: Sequence[str], margin: _Margin, stock: Stock) -> tuple[Strok
 
 
 def _wrapped(text: str, count: int) -> list[str]:
-    """Return the text in at most this number of lines, the longest as short as words allow."""
+    """Return the text in at most this number of lines, the longest as short as possible."""
     for most in range(1, len(text) + 1):
         lines = wrap(text, most, break_long_words=False, break_on_hyphens=False)
         if len(lines) <= count and max(map(len, lines)) <= most:
@@ -343,7 +343,7 @@ def clearance(spacing: float) -> float:
 
 
 def _corners(outline: shapely.MultiPolygon, size: Point, clear: float) -> Iterator[Point]:
-    """Yield lower left corners of boxes round a part, on lines that keep off it."""
+    """Yield lower left corners of boxes around a part, on lines clear of it."""
     import shapely
 
     for off in (size[1] / 2, size[0] / 2, (size[0] ** 2 + size[1] ** 2) ** 0.5 / 2):

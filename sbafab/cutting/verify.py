@@ -1,4 +1,4 @@
-"""Verification: every cut file is read back and compared with the profile it was written from."""
+"""Verification: every cut file is read back and compared with its source profile."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ def verify_file(
 ) -> ReadBack:
     """Read the file at ``path``, compare it with the intended contours, and return it.
 
-    A film sheet is compared with its lines beside the parts, too.
+    The lines besides the parts of a film sheet are also compared.
 
     Raises OutputError with the file, the worst deviation and its place.
     """
     read = read_profile(path)
     try:
         if read.units != "mm":
-            raise OutputError("it does not say that its units are millimetres.")
+            raise OutputError("it does not state millimetres as its units.")
         _check_properties(read.properties, expected_properties)
         check_sequence(read)
         check_contours(read.region, expected, TOLERANCE)
@@ -53,7 +53,7 @@ def verify_file(
 
 
 def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
-    """Compares a sheet's lines beside its parts: engraving in the waste, parting cut, frame.
+    """Compare a sheet's lines besides its parts: engraving in the waste, parting cut, frame.
 
     Raises OutputError with the layer and place of a difference, or of engraving inside a part.
     """
@@ -72,7 +72,7 @@ def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
             ):
                 x, y = run[0]
                 raise OutputError(
-                    f"the stroke on {layer} at x {x:.3f}, y {y:.3f} differs from what was written."
+                    f"the stroke on {layer} at x {x:.3f}, y {y:.3f} differs from the written one."
                 )
     engraved = [edge for name, edges in read.strokes if name == ENGRAVE for edge in edges]
     if not engraved:
@@ -89,7 +89,7 @@ def check_surroundings(read: ReadBack, expected: Surroundings) -> None:
 def check_datum(read: ReadBack) -> None:
     """Raise OutputError if a layer's file holds more than its contours and the datum cross.
 
-    The cross must be present: layers are aligned by it.
+    The cross must be present, because it aligns the layers.
     """
     arm = DATUM_ARM
     missing = [((-arm, 0.0), (arm, 0.0)), ((0.0, -arm), (0.0, arm))]
@@ -104,7 +104,7 @@ def check_datum(read: ReadBack) -> None:
             )
         missing.remove(datum[0])
     if missing:
-        raise OutputError("the datum cross at x 0, y 0 is not whole; regenerate it.")
+        raise OutputError("the datum cross at x 0, y 0 is incomplete; regenerate it.")
 
 
 def _check_properties(properties: Mapping[str, str], expected: Mapping[str, str]) -> None:
@@ -145,13 +145,13 @@ def check_contours(region: Region, expected: Region, tolerance: float) -> None:
             )
             if off > tolerance:
                 raise OutputError(
-                    f"an edge is {off:.6f} mm off at x {x:.3f}, y {y:.3f}, "
-                    f"where {tolerance:g} is allowed."
+                    f"an edge is {off:.6f} mm off at x {x:.3f}, y {y:.3f}; the limit is "
+                    f"{tolerance:g}."
                 )
 
 
 def _same(contour: Contour, second: Contour, room: float) -> bool:
-    """Return True if two contours have equal edges, from whichever vertex, to within ``room``."""
+    """Return True if two contours have equal edges, from any vertex, within ``room``."""
     ours, theirs = contour.edges, second.edges
     if len(ours) != len(theirs):
         return False
@@ -173,9 +173,9 @@ def _same_edge(a: Edge, b: Edge, room: float) -> bool:
 def deviation(
     edges: Sequence[Edge], expected: Sequence[Edge], tolerance: float
 ) -> tuple[float, Point]:
-    """Return the largest distance in mm of edges from others, and where.
+    """Return the largest distance in mm of edges from others, and its place.
 
-    It is measured from places along every edge: thirds of a line, eighths of an arc.
+    It is measured at points along every edge: thirds of a line, eighths of an arc.
     """
     index = EdgeIndex(expected)
     worst = 0.0, edges[0].start

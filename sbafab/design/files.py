@@ -1,4 +1,4 @@
-"""Design files: TOML in and out, changes to keys, messages for faults, hashes, and templates."""
+"""Design files: TOML in and out, changes to keys, error messages, hashes, and templates."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def listed(values: Iterable[object]) -> str:
 
 
 def suggestion(name: object, names: Iterable[str]) -> str:
-    """Return the known name that is most like another one as a question; empty if none is."""
+    """Return the known name most similar to another as a question; empty if there is none."""
     near = difflib.get_close_matches(shown(name).strip("'"), names, 1)
     return f"; did you mean {near[0]}?" if near else ""
 
@@ -49,7 +49,7 @@ def hint(name: object, names: Iterable[str], others: str = "") -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Return True for a file; False for a path that no system takes, such as one with a NUL."""
+    """Return True for a file; False for an impossible path, such as one with a NUL."""
     try:
         return path.is_file()
     except (OSError, ValueError):
@@ -57,14 +57,14 @@ def is_file(path: Path) -> bool:
 
 
 def refuse_file_as_folder(out: Path) -> None:
-    """Raises OutputError if a folder to write into, or one above it, is a file."""
+    """Raise OutputError if a folder for output, or one above it, is a file."""
     for place in (out, *out.parents):
         if is_file(place):
             raise OutputError(f"{place} is a file, not a folder; choose a folder with -o")
 
 
 def shown(value: object) -> str:
-    """Return a value as it may appear in a message: short, on one line."""
+    """Return a value for messages: short, on one line."""
     try:
         text = repr(str(value)) if isinstance(value, str | Path) else str(value)
         if isinstance(value, bool):
@@ -113,7 +113,7 @@ def sentence(
 
 
 def _plain(part: int | str) -> str:
-    """A key as it may appear in a message."""
+    """Return a key for messages."""
     text = str(part)
     return text if text.isprintable() and len(text) <= 60 else shown(text)
 
@@ -196,7 +196,7 @@ def _unknown_key(
 
 
 def _nearest(key: str, paths: Iterable[str], cutoff: float) -> str | None:
-    """Return up to three paths with the last part most similar to ``key``, the pockets' first."""
+    """Return up to three paths whose last part is most similar to ``key``, the pockets' first."""
     leaves: dict[str, list[str]] = {}
     for path in sorted(paths, key=lambda path: not path.startswith("chamber.")):
         leaves.setdefault(path.split(".")[-1], []).append(path)
@@ -278,7 +278,7 @@ def design_path(source: str | Path) -> Path:
 
 
 def _hint(missing: Path) -> str:
-    """Suggestion for a design that does not exist."""
+    """Return a suggestion for a design that does not exist."""
     names = template_names()
     with suppress(OSError, ValueError):
         beside = [
@@ -351,7 +351,7 @@ LONGEST_LINE = 120
 def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
     """Return ``data`` with every change made: keys set by ``key.path=value`` texts or by tables.
 
-    The value in a text is TOML, or else plain text. Raises DesignError for an invalid change.
+    The value in a text is TOML or plain text. Raises DesignError for an invalid change.
     """
     changed = _copied(data)
     for change in changes:
@@ -370,7 +370,7 @@ def override(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, An
 
 
 def changed_keys(changes: Iterable[Change]) -> Iterator[str]:
-    """Every dotted key that the changes set."""
+    """Return every dotted key that the changes set."""
     for change in changes:
         if isinstance(change, str):
             yield ".".join(_key_parts(change.partition("=")[0]))
@@ -386,7 +386,7 @@ def _key_parts(key: str) -> list[str]:
 
 
 def _set(table: dict[str, Any], key: str, value: Any) -> None:
-    """Sets a dotted key; a table as value changes only its own keys."""
+    """Set a dotted key; a table as value changes only its own keys."""
     parts = _key_parts(key)
     if len(parts) > DEEPEST:
         raise DesignError(f"--set {shown(key)} has {len(parts)} parts; a design's keys have three")
@@ -403,7 +403,7 @@ def _set(table: dict[str, Any], key: str, value: Any) -> None:
 
 
 def as_in_a_file(value: Any) -> Any:
-    """Return a value as TOML holds it: tuples and arrays as lists, numpy's numbers as Python's."""
+    """Return a value in TOML types: tuples and arrays as lists, NumPy numbers as Python's."""
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, Mapping):
@@ -414,7 +414,7 @@ def as_in_a_file(value: Any) -> Any:
 def with_changes(data: Mapping[str, Any], changes: Iterable[Change]) -> dict[str, Any]:
     """Return a design's tables with changes to its keys.
 
-    Paths of drawings and kits that they name are relative to the working directory. Changes to
+    Paths of drawings and kits in the changes are relative to the working directory. Changes to
     ``fits`` clear ``chamber.diameter`` unless they set it. Raises DesignError for invalid changes.
     """
     changes = list(changes)
@@ -438,7 +438,7 @@ def _from_user(path: object) -> str:
 
 
 def rule_names() -> tuple[str, ...]:
-    """Return the names of all rules, with rules of installed packages last."""
+    """Return the names of all rules, those of installed packages last."""
     return (*catalogue.names("rules"), *(entry.name for entry in plugins.installed(plugins.RULES)))
 
 
@@ -447,7 +447,7 @@ def add_waivers(
 ) -> dict[str, Any]:
     """Return ``data`` with names of rules, or of ``checks``, added to ``rules.waive``.
 
-    Raises DesignError for other names, with the command line's message.
+    Raises DesignError for other names, with the message of the command line.
     """
     names = (*rule_names(), *checks) if waivers else ()
     for name in waivers:
@@ -483,10 +483,7 @@ def checked(
     prefix: str = "",
     file: str = "design file",
 ) -> AnyRecord:
-    """The record of a table; ``prefix`` leads to it, in a ``file`` of this kind.
-
-    Raises DesignError with one sentence.
-    """
+    """Return the record of a table; ``prefix`` leads to it, in a ``file`` of this kind."""
     try:
         return record.model_validate(data)
     except ValidationError as error:
@@ -502,7 +499,7 @@ KITS = "kits"
 
 @cache
 def templates_folder() -> Path:
-    """Return the folder of the templates: in the installed package, or beside it in a checkout."""
+    """Return the folder of the templates: in the installed package, or in a source checkout."""
     packaged = Path(__file__).parents[1] / "templates"
     return packaged if packaged.is_dir() else packaged.parents[1] / "templates"
 
@@ -518,7 +515,7 @@ def kit_names() -> list[str]:
 
 @cache
 def _designs_in(folder: Path) -> tuple[str, ...]:
-    """Names of the bundled files in a folder, which does not change while a process runs."""
+    """Return the names of the bundled files in a folder, which does not change during a process."""
     return tuple(sorted(path.stem for path in folder.glob("*.toml")))
 
 
@@ -541,7 +538,7 @@ def template_summaries() -> dict[str, str]:
 
 
 def write_new(template: str, file: Path | None) -> Path:
-    """Copy a template's commented file, named after the new file; never over an old one."""
+    """Copy a template's commented file, named after the new file, without overwriting."""
     return write_copy(_template(template), file or Path(f"{template}.toml"))
 
 
@@ -551,7 +548,7 @@ def name_of(text: str) -> str:
 
 
 def write_copy(source: Path, target: Path) -> Path:
-    """Copy a commented file, named after the new one; never over an old one."""
+    """Copy a commented file, named after the new one, without overwriting."""
     text = source.read_text(encoding="utf-8")
     name = name_of(target.stem) or source.stem
     text = text.replace(f'name = "{source.stem}"', f'name = "{name}"', 1)

@@ -53,7 +53,7 @@ PoissonRatio = Annotated[float, Field(ge=0, lt=0.5), BeforeValidator(_poisson)]
 
 
 def is_kerf(x: float, y: float) -> bool:
-    """Return True for a possible beam width: up to a millimetre, and nowhere ten times as wide."""
+    """Return True for a possible beam width: up to 1 mm, with an aspect ratio up to ten."""
     return min(x, y) >= 0 and max(x, y) <= min(1.0, 10 * min(x, y)) and math.isfinite(x + y)
 
 
@@ -67,8 +67,8 @@ def _kerf(value: object) -> Kerf | str:
         x = y = -1.0
     if not is_kerf(x, y):
         raise ValueError(
-            "must be a length from 0 to 1 mm, or two of them, [along x, along y], neither over "
-            'ten times the other, or "uncalibrated"'
+            "must be a length from 0 to 1 mm, or two, [along x, along y], with a ratio of at "
+            'most ten, or "uncalibrated"'
         )
     return x if x == y else (x, y)
 
@@ -83,7 +83,7 @@ SheetPin = Annotated[tuple[LengthOrZero, LengthOrZero, Length], Field(strict=Fal
 
 
 class Sheet(Section):
-    """Film to cut from, as placed on the machine."""
+    """A film sheet to cut, as placed on the machine."""
 
     width: Annotated[float, Millimetres(SHORTEST, 10000)] = 152.4
     """Size along x; the heated area of the paper's press."""
@@ -145,9 +145,7 @@ class FaceBonding(Section):
 
 
 class FaceBondings(NamedTables):
-    """Faces that bond, a table for each pair; with any table, faces that are in none do not
-    bond.
-    """
+    """Faces that bond, one table for each pair; if there are any, other faces do not bond."""
 
     what, names, names_are = "bond", FACE_PATTERN, "of small letters"
     __pydantic_extra__: dict[str, FaceBonding] = Field(init=False)
@@ -157,8 +155,8 @@ class FaceBondings(NamedTables):
         for name, bond in self.by_name.items():
             if bond.after is not None and (bond.after == name or bond.after not in self.by_name):
                 raise ValueError(
-                    f"has bond {name} after {bond.after[:40]!r}, which is not another bond of it; "
-                    f"there are {', '.join(self.by_name)}"
+                    f"has bond {name} after {bond.after[:40]!r}, which is not another bond in "
+                    f"this table; use {', '.join(self.by_name)}"
                 )
         return self
 
@@ -168,8 +166,8 @@ OF_THE_PRODUCT = ("density", "melting_point", "modulus", "poisson")
 
 
 class TpeFilm(Section):
-    """The structural film that is bonded. The defaults describe the paper's film and do not apply
-    to another product: values missing in its table are unknown.
+    """The structural film. The defaults describe the paper's film and do not apply to another
+    product, for which missing values are unknown.
     """
 
     product: str = Field(default=PAPER_PRODUCT, max_length=80)
@@ -201,14 +199,14 @@ class TpeFilm(Section):
     def _another_product_has_its_thickness(self) -> Self:
         if self.product != PAPER_PRODUCT and "thickness" not in self.model_fields_set:
             raise ValueError(
-                f"names another product than {PAPER_PRODUCT} and no thickness; add thickness, for "
-                f'instance "50 um", and what is known of {", ".join(OF_THE_PRODUCT)}'
+                f"names another product than {PAPER_PRODUCT} but no thickness; add thickness, for "
+                f'instance "50 um", and the known values of {", ".join(OF_THE_PRODUCT)}'
             )
         return self
 
 
 class PtfeFilm(Section):
-    """The film of the masks, which nothing bonds to."""
+    """The mask film, which does not bond."""
 
     product: str = Field(default="PTFE film", max_length=80)
     """Product to order."""
@@ -221,7 +219,7 @@ class PtfeFilm(Section):
 
 
 class OtherFilm(Section):
-    """A further film: another thickness or polymer, one that does not stretch, another mask."""
+    """An additional film: another thickness or polymer, an inextensible film, or another mask."""
 
     kind: FilmKind
     """"structural": bonds where it touches another structural film. "mask": nothing bonds to it."""
@@ -254,12 +252,12 @@ class OtherFilm(Section):
         if self.kind == "mask" and self.temperature_limit is None:
             raise ValueError("is a mask without temperature_limit; add it, in C")
         if self.kind == "mask" and self.melting_point is not None:
-            raise ValueError("is a mask, to which nothing bonds; remove melting_point")
+            raise ValueError("is a mask, which does not bond; remove melting_point")
         return self
 
 
 class Films(NamedTables):
-    """Films that the layers are cut from: TPE, PTFE, and further films, a table for each."""
+    """The films from which layers are cut: TPE, PTFE, and additional films, one table each."""
 
     what, names, most = "film", FILM_NAME, 20
     names_are = 'a small letter and up to 15 small letters or digits, such as "tpu50"'
@@ -270,7 +268,7 @@ class Films(NamedTables):
 
     @property
     def face_names(self) -> frozenset[str]:
-        """Materials of the faces of structural films; a film without faces has its own name."""
+        """The materials of the faces of structural films; a film without faces has its own name."""
         bonding = {name: film for name, film in self.stock.items() if film.kind != "mask"}
         return frozenset(face for name, film in bonding.items() for face in film.faces or (name,))
 
@@ -300,7 +298,7 @@ class Films(NamedTables):
 def _film(
     name: str, table: TpeFilm | PtfeFilm | OtherFilm, softens: float | None, *more: Any, **keys: Any
 ) -> Film:
-    """The film of a table, with the elasticity and the faces that it states in full."""
+    """Return the film of a table, with the elasticity and the faces that it states in full."""
     if not isinstance(table, PtfeFilm):
         if table.modulus is not None and table.poisson is not None:
             keys["elastic"] = table.modulus, table.poisson
@@ -311,11 +309,11 @@ def _film(
 
 
 def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``table``, tables of films by name, without values that do not hold for ``changed``.
+    """Return ``table``, tables of films by name, without values that are invalid for ``changed``.
 
     A film with another product in ``changed`` loses all its values in ``table`` except kind, sheet
     and kerf: thickness, density and the rest describe the first product. PTFE is one polymer under
-    any name, and keeps them.
+    any name, and keeps its values.
     """
     rest = dict(table)
     for name, film in table.items():
@@ -328,12 +326,12 @@ def without_other_products(table: Mapping[str, Any], changed: Mapping[str, Any])
 
 
 def material(name: str) -> Material:
-    """Name of this table's film in files and lists."""
+    """Return the name of this table's film in files and lists."""
     return name.upper()
 
 
 class LayerFilms(Section):
-    """Film of each layer, by the names of the tables in ``films``."""
+    """The film of each layer, by the names of the tables in ``films``."""
 
     base: str = "tpe"
     """The lowest film of the bottom balloons."""
@@ -385,7 +383,7 @@ class Recipe(Section):
     @model_validator(mode="after")
     def _has_a_source(self) -> Self:
         if not self.source.strip():
-            raise ValueError("has no source; say where power and speed are from")
+            raise ValueError("has no source; state the source of power and speed")
         return self
 
     @property

@@ -1,4 +1,4 @@
-"""Identity of a design: its hashes, and its kit with the departures from it."""
+"""Identity of a design: its hashes, and its kit with the deviations from it."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from sbafab.laminate.films import Film
 
 
 def design_sha256(design: Design) -> str:
-    """Return the hash of everything that determines the output, named files by their content."""
+    """Return the hash of all inputs of the output, with the contents of named files."""
     return tables_sha256(_with_files(with_unused(design), design) | {"kit": kit_of(design).sha256})
 
 
 def actuator_sha256(design: Design) -> str:
-    """Return the hash of an actuator of the design, however many are made, and on which tools.
+    """Return the hash of an actuator of the design, regardless of quantity and tools.
 
-    It counts shapes, the films' kind, product and thickness, tube and adhesive, how films are
-    registered and bonded, and whether a kerf is compensated: uncompensated parts are narrower.
-    Left out are name, kit, order, sheets, rules, tolerances, tools, and the kerf's width.
+    It includes shapes, the films' kind, product and thickness, tube and adhesive, registration and
+    bonding of films, and whether a kerf is compensated: uncompensated parts are narrower. It
+    excludes name, kit, order, sheets, rules, tolerances, tools, and the width of the kerf.
     """
     table = _with_files(with_unused(design), design)
     for section in NO_ACTUATOR:
@@ -59,7 +59,7 @@ BONDED = (
 
 
 def _films(design: Design) -> dict[str, list[object]]:
-    """Films by table name: kind, product, thickness, and True if the kerf is measured."""
+    """Return films by table name: kind, product, thickness, and True if the kerf is measured."""
     kerfs = {name: film.kerf for name, film in design.films.by_name.items()}
     kerfs |= {"tpe": design.laser.kerf_tpe, "ptfe": design.laser.kerf_ptfe}
     return {
@@ -69,7 +69,7 @@ def _films(design: Design) -> dict[str, list[object]]:
 
 
 def _with_files(table: dict[str, Any], design: Design) -> dict[str, Any]:
-    """Return the table with the contents of drawn outlines and calibration for their paths."""
+    """The table with file contents in place of the paths of drawn outlines and calibration."""
     files = dict(design.drawings)
     calibration = design.folder / design.models.calibration
     if design.models != Models() and calibration.is_file():
@@ -79,7 +79,7 @@ def _with_files(table: dict[str, Any], design: Design) -> dict[str, Any]:
 
 
 def tables_sha256(table: Any) -> str:
-    """Return the hash of tables, whatever the order of their keys."""
+    """Return the hash of tables, regardless of the order of their keys."""
     text = json.dumps(table, sort_keys=True, separators=(",", ":"), ensure_ascii=False)
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -110,7 +110,7 @@ def departures(design: Design) -> list[str]:
 
 
 def tube_name(design: Design) -> str:
-    """Return the design's tubing, unless a tube of that name has another size in the kit."""
+    """Return the design's tubing, unless the kit has a tube of that name with another size."""
     tube = kit_of(design).record.tubes.get(design.inlet.tube)
     if tube is not None and tube.outer_diameter != design.inlet.tube_outer_diameter:
         return OTHER_TUBE
@@ -128,7 +128,7 @@ def adhesive_for(design: Design, films: Iterable[Film]) -> str | None:
 
 
 def cure_hours(design: Design) -> float | None:
-    """Return the hours in which the tubes' adhesive cures: the order's, the kit's, else None."""
+    """Return the cure time in hours of the tubes' adhesive: the order's, the kit's, else None."""
     if design.order.cure_hours is not None:
         return design.order.cure_hours
     adhesive = kit_of(design).record.adhesives.get(design.inlet.adhesive)

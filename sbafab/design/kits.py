@@ -1,7 +1,7 @@
 """Kits: a lab's films, tubes, press, laser and limits, in one file with a source for every number.
 
 A kit gives a design every key of films, layup, registration, press, acceptance, laser, sheets and
-rules that the design itself leaves out, and the tube and adhesive of its inlets.
+rules that the design omits, and the tube and adhesive of its inlets.
 """
 
 from __future__ import annotations
@@ -92,7 +92,7 @@ class Adhesive(Section):
 
 
 class KitFile(Section):
-    """All tables of a kit's file, sources taken out."""
+    """All tables of a kit's file, without sources."""
 
     schema_name: Literal["sbafab/kit@1"] = Field(alias="schema")
     name: str = Field(pattern=NAME_PATTERN)
@@ -115,10 +115,10 @@ class KitFile(Section):
 
 @dataclass(frozen=True)
 class Kit:
-    """A kit that was read.
+    """A loaded kit.
 
-    ``tables`` hold its sections with plain values; ``sha256`` is the hash of all tables, and
-    ``text`` the file on disk, unchanged.
+    ``tables`` holds its sections with plain values; ``sha256`` is the hash of all tables, and
+    ``text`` the unchanged file.
     """
 
     record: KitFile
@@ -128,9 +128,9 @@ class Kit:
 
 
 def kit_path(kit: object, folder: Path) -> Path:
-    """Return the file of the kit that a design in ``folder`` names. Raises DesignError."""
+    """Return the file of the kit named by a design in ``folder``. Raises DesignError."""
     if not isinstance(kit, str):
-        raise DesignError(f"kit = {shown(kit)} must be a text in quotes: a kit's name or its file")
+        raise DesignError(f"kit = {shown(kit)} must be a quoted text: the name or file of a kit")
     try:
         writable(kit)
     except ValueError as error:
@@ -140,21 +140,21 @@ def kit_path(kit: object, folder: Path) -> Path:
     path = folder / kit
     if not is_file(path):
         raise DesignError(
-            f"kit = {shown(kit)} is neither a kit that ships ({', '.join(kit_names())}) nor a file "
-            "beside the design; sbafab new kit writes one to start from"
+            f"kit = {shown(kit)} is neither a bundled kit ({', '.join(kit_names())}) nor a file "
+            "beside the design; sbafab new kit writes a first one"
         )
     return path
 
 
 def read_kit(path: Path) -> Kit:
-    """Return the kit of a file. Raises DesignError with one sentence for a fault in it."""
+    """Return the kit in a file. Raises DesignError with one sentence if the file is invalid."""
     tables = read_toml(path)
     plain = _without_sources(tables, "", path)
     for key in OF_A_DESIGN:
         section, _, name = key.partition(".")
         table = plain.get(section)
         if isinstance(table, dict) and name in table:
-            raise DesignError(f"{path}: {key} is a design's to say, not a kit's; remove it")
+            raise DesignError(f"{path}: {key} belongs in a design, not in a kit; remove it")
     try:
         record = checked(KitFile, plain, {}, file="kit")
     except DesignError as error:
@@ -168,16 +168,16 @@ def read_kit(path: Path) -> Kit:
 
 
 def _complete_press(table: dict[str, Any], press: Press, path: Path) -> None:
-    """Add to a kit's table the minutes that it leaves out, as not known, if it names another film
-    than the paper's, whose values do not hold for it. Raises DesignError without temperature or
-    pressure, which those minutes are for.
+    """Add to a kit's table the minutes that it omits, as unknown, if it names a film other than the
+    paper's, whose values do not apply to it. Raises DesignError if the temperature or pressure for
+    those minutes is missing.
     """
     films = [film for film in press.timed_films if film != (PAPER_PRODUCT, PAPER_THICKNESS)]
     for key in ("temperature_c", "pressure_kpa") if films else ():
         if key not in table:
             raise DesignError(
-                f"{path}: press.minutes_for names {films[0][0]}, and press.{key} is missing; state "
-                "that at which its minutes held"
+                f"{path}: press.minutes_for names {films[0][0]}, but press.{key} is missing; "
+                "state the value for its minutes"
             )
     table.update({key: None for key in MINUTES if films and key not in table})
 
@@ -216,7 +216,7 @@ def _without_sources(table: Mapping[str, Any], prefix: str, path: Path) -> dict[
 
 
 def _is_number(value: object) -> bool:
-    """Return True if a value is a number, one with its unit, or a list with one in it."""
+    """Return True if a value is a number, a number with a unit, or a list that contains one."""
     if isinstance(value, list):
         return any(map(_is_number, value))
     if isinstance(value, str):
@@ -225,7 +225,7 @@ def _is_number(value: object) -> bool:
 
 
 def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a design's tables with every key filled in that its kit gives and the design lacks.
+    """Return a design's tables with the kit's values for every key that the design lacks.
 
     Raises DesignError if the kit is missing or faulty, or lacks the tube.
     """
@@ -248,7 +248,7 @@ def under_kit(data: Mapping[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _from_folder(table: Mapping[str, Any], kit_folder: Path, folder: Path) -> Mapping[str, Any]:
-    """Return the table, the path of a calibration beside the kit relative to the design's."""
+    """Return the table, with the path of a calibration beside the kit relative to the design's."""
     name = table.get("calibration")
     if not isinstance(name, str) or not (kit_folder / name).is_file():
         return table
@@ -256,7 +256,7 @@ def _from_folder(table: Mapping[str, Any], kit_folder: Path, folder: Path) -> Ma
 
 
 def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str, Any]:
-    """The table with all ``overrides`` in place, table by table."""
+    """Return the table with all ``overrides`` applied, table by table."""
     merged = {**table, **overrides}
     for key, value in overrides.items():
         if isinstance(value, dict) and isinstance(table.get(key), dict):
@@ -265,7 +265,7 @@ def _merged(table: Mapping[str, Any], overrides: Mapping[str, Any]) -> dict[str,
 
 
 def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str, Any]:
-    """Return the kit's first adhesive, and its first tube or the one that the inlet names."""
+    """Return the kit's first adhesive, and its first tube or the one named by the inlet."""
     tubes, adhesives = kit.record.tubes, kit.record.adhesives
     values = {"adhesive": next(iter(adhesives))} if adhesives else {}
     if not tubes:
@@ -275,7 +275,7 @@ def inlet_of_kit(kit: Kit, inlet: Mapping[str, Any], is_named: bool) -> dict[str
         return {**values, "tube": name, "tube_outer_diameter": tubes[name].outer_diameter}
     if is_named and "tube_outer_diameter" not in inlet:
         raise DesignError(
-            f"inlet.tube = {shown(name)} is not in kit {kit.record.name} ({listed(tubes)}); name "
+            f"inlet.tube = {shown(name)} is not in kit {kit.record.name} ({listed(tubes)}); use "
             "one of those, add it to the kit, or give inlet.tube_outer_diameter"
         )
     return values

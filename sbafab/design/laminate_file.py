@@ -1,7 +1,7 @@
-"""``laminate.json``: a laminate with exact edges, to be read by other programs and read back here.
+"""``laminate.json``: a laminate with exact edges, for other programs and for reading back.
 
 Films and shapes are listed once each; layers refer to them by index, from 0. ``LaminateDocument``
-is the format: its JSON schema is published, and files are read by it.
+is the format: its JSON schema is published, and files are read with it.
 """
 
 from __future__ import annotations
@@ -96,7 +96,7 @@ class SeamRow(_Row):
 
 
 class LaminateDocument(_Row):
-    """A ``laminate.json``. Files of earlier versions lack the keys that have defaults here."""
+    """A ``laminate.json``. Files of earlier versions lack keys that have defaults here."""
 
     schema_id: Annotated[Literal["sbafab/laminate@1"], Field(alias="schema")]
     name: str
@@ -179,7 +179,7 @@ def _document(laminate: Laminate) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Records as tables of their values."""
+    """Return records as tables of their values."""
     is_rows = isinstance(value, tuple) and all(map(is_dataclass, value))
     return [asdict(row) for row in value] if is_rows else value
 
@@ -202,9 +202,10 @@ def _rows(value: Any) -> str:
 
 
 def read_laminate(path: str | Path) -> Laminate:
-    """Return the laminate of a ``laminate.json``, equal to the one that was written.
+    """Return the laminate of a ``laminate.json``, equal to the written one.
 
-    Unknown keys are ignored. Raises DesignError with the file and the place in it for other files.
+    Unknown keys are ignored. Raises DesignError with the file and the place in it for invalid
+    files.
     """
     try:
         document = LaminateDocument.model_validate_json(Path(path).read_bytes())
@@ -219,10 +220,10 @@ def read_laminate(path: str | Path) -> Laminate:
         words = (
             sentence(error, LaminateDocument, {}, "", FILE) if is_object else "it is not an object"
         )
-        raise DesignError(f"{path} is not a sound laminate; {words}") from None
+        raise DesignError(f"{path} is not a valid laminate; {words}") from None
     fault = next(_faults(document), None)
     if fault is not None:
-        raise DesignError(f"{path} is not a sound laminate; {fault}")
+        raise DesignError(f"{path} is not a valid laminate; {fault}")
     return _laminate(document)
 
 
@@ -304,7 +305,7 @@ def _chain_faults(where: str, rows: Sequence[Any], is_closed: bool) -> Iterator[
 
 
 def _crossing(edges: Sequence[Edge]) -> Point | None:
-    """Return the point where two edges cross, away from their ends; None if no two do."""
+    """Return the point where two edges cross, away from their ends; None if there is none."""
     for i, j in close_pairs([edge.bounds for edge in edges], 0.0):
         a, b = edges[i], edges[j]
         for p in meeting_points(a, b):

@@ -1,6 +1,6 @@
-"""Drawings of the user: the outline of a pocket, or the contours of whole layers.
+"""Drawings by the user: the outline of a pocket, or the contours of whole layers.
 
-A DXF or SVG file holds polylines, chains of edges, whose ends make loops. All coordinates are mm.
+A DXF or SVG file holds polylines, chains of edges, whose ends form loops. All coordinates are mm.
 """
 
 from __future__ import annotations
@@ -60,10 +60,10 @@ def _content(path: Path) -> bytes:
 
 
 def read_outline(path: Path) -> Region:
-    """The one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
+    """Return the one closed path of a DXF or SVG file as lines and arcs, in mm, counter-clockwise.
 
     The chamber's axis is the file's origin if that lies inside, else the outline's centroid. DXF
-    units follow $INSUNITS, none meaning mm; an SVG without width and height in physical units is
+    units follow $INSUNITS, with mm as default; an SVG without width and height in physical units is
     read as 1 unit = 1 mm, and its y axis is turned upward, so that the outline looks as drawn.
     Ellipses, Béziers and splines become arcs within 0.5 um. Raises DesignError.
     """
@@ -91,8 +91,8 @@ def _outline(path: Path, content: bytes) -> tuple[Region, str]:
         x, y = centroid(region)
         if not _surrounds(region, (x, y)):
             raise DesignError(
-                "has its centroid outside itself, so the chamber's axis has no place; draw it "
-                "round (0, 0)"
+                "has its centroid outside itself, so the position of the chamber's axis is "
+                "undefined; draw it around (0, 0)"
             )
         # The printed shift is the one applied.
         region, shift = region.moved(-round(x, 6), -round(y, 6)), ", centred on its centroid"
@@ -116,13 +116,12 @@ def _surrounds(region: Region, p: Point) -> bool:
 
 
 def read_drawing(path: Path, layer: str | None = None) -> Region:
-    """Return the region enclosed by the closed contours of a drawing, at their place in it, mm.
+    """Return the region enclosed by the closed contours of a drawing, in its own coordinates, mm.
 
-    Contours are nested by the even-odd rule: one inside another is a hole. Layers of a DXF file
-    that are not plotted are ignored unless named. ``layer`` names a layer of a DXF file, a group of
-    an SVG file by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a
-    ``laminate.json``. Units are read as for an outline. Raises DesignError with the file and the
-    place.
+    Contours are nested by the even-odd rule: one inside another is a hole. Unplotted layers of a
+    DXF file are ignored unless named. ``layer`` names a layer of a DXF file, a group of an SVG file
+    by its label or id, or a pattern, ``outline`` or ``seam NAME`` of a ``laminate.json``. Units are
+    read as for an outline. Raises DesignError with the file and the place.
     """
     with _faults_of("drawing", path):
         if path.suffix.lower() == ".json":
@@ -132,7 +131,7 @@ def read_drawing(path: Path, layer: str | None = None) -> Region:
 
 @lru_cache(maxsize=64)
 def _drawn(path: Path, content: bytes, layer: str | None) -> Region:
-    """The region of a file with this content; cached, as a run needs it more than once."""
+    """The region of a file with this content; cached, since a run needs it more than once."""
     polylines, _ = _traced(path, layer, is_plot=True)
     contours = _contours(polylines, MOST_EDGES)
     p = crossing(tuple(edge for contour in contours for edge in contour.edges))
@@ -161,7 +160,7 @@ def _profile(profiles: Mapping[str, Region], layer: str | None) -> Region:
     if layer is None:
         raise DesignError(f"is a laminate; name one of its patterns as layer: {listed(profiles)}")
     if layer not in profiles:
-        raise DesignError(f"has no pattern {shown(layer)}; there are {listed(profiles)}")
+        raise DesignError(f"has no pattern {shown(layer)}; use {listed(profiles)}")
     return profiles[layer]
 
 
@@ -173,7 +172,7 @@ def _traced(
 ) -> tuple[Iterator[Polyline], str]:
     """Return the polylines of a DXF or SVG file, or of one of its layers, and its unit as text.
 
-    ``is_plot``: layers of a DXF file that are not plotted count only if named.
+    ``is_plot``: unplotted layers of a DXF file count only if named.
     """
     if path.suffix.lower() == ".dxf":
         return dxf_polylines(path, layer, is_plot)
@@ -218,12 +217,12 @@ def _closed_loops(chains: Sequence[Polyline]) -> list[Polyline]:
             meet = [c for c in chains if any(math.dist(e.start, (x, y)) <= JOIN for e in c)]
             raise _contact(error.place, of_several=len(meet) > 1) from None
         raise DesignError(
-            f"is open: a gap of {error.gap:.4f} mm at x {x:.4f}, y {y:.4f}, where {JOIN} is "
-            "allowed; join the ends, or delete what is not the outline"
+            f"is open: a gap of {error.gap:.4f} mm at x {x:.4f}, y {y:.4f}, the limit is {JOIN}; "
+            "join the ends, or delete everything but the outline"
         ) from None
     if not loops:
         raise DesignError(
-            "holds no closed path; draw one of lines, arcs or curves, and explode blocks"
+            "has no closed path; draw one of lines, arcs or curves, and explode blocks"
         )
     return list(map(tuple, loops))
 
@@ -238,7 +237,7 @@ def _nested(contours: list[Contour]) -> Region:
 
 
 def refuse_crossings(loop: Polyline) -> None:
-    """Raises DesignError if a closed loop crosses or touches itself."""
+    """Raise DesignError if a closed loop crosses or touches itself."""
     p = crossing(loop)
     if p is not None:
         raise _contact(p, of_several=False)
@@ -248,13 +247,13 @@ def _contact(p: Point, of_several: bool) -> DesignError:
     place = f"x {p[0]:.4f}, y {p[1]:.4f}"
     if of_several:
         return DesignError(
-            f"has contours that cross or touch each other at {place}; draw them apart, or join them"
+            f"has contours that cross or touch each other at {place}; separate or join them"
         )
     return DesignError(f"crosses or touches itself at {place}; draw it without the loop")
 
 
 def crossing(loop: Polyline) -> Point | None:
-    """Return a place where edges of closed loops cross or touch, except at shared ends."""
+    """Return a point where edges of closed loops cross or touch, except at shared ends."""
     # A tangle is reported at its first crossing: there may be one for every two edges.
     for i, j in close_pairs([edge.bounds for edge in loop], EPSILON):
         ends = loop[i].start, loop[i].end, loop[j].start, loop[j].end

@@ -1,4 +1,4 @@
-"""The polylines of a DXF drawing: what its model space shows, read by ezdxf, in mm."""
+"""The polylines of a DXF drawing: the visible content of its model space, read by ezdxf, in mm."""
 
 from __future__ import annotations
 
@@ -54,8 +54,8 @@ def dxf_polylines(
     the size of its unit as text.
 
     They must lie in one plane at one height. Only entities on ``layer`` count if it is given;
-    otherwise, for a plot, those on plotted layers. Raises DesignError, also for entities that draw
-    by other means, such as block references.
+    otherwise, for a plot, those on plotted layers. Raises DesignError, also for other visible
+    entities, such as block references.
     """
     content = path.read_bytes()
     _refuse_excess(content)
@@ -79,15 +79,15 @@ def dxf_polylines(
 
 
 def _refuse_excess(content: bytes) -> None:
-    """Raises DesignError for a drawing that would take too long to read."""
+    """Raise DesignError for a drawing that would take too long to read."""
     if content.startswith(b"AutoCAD Binary DXF"):
         items = len(re.findall(rb"\0[A-Z]", content))
     else:
         items = sum(line.strip() == b"0" for line in content.splitlines())
     if items > MOST_ITEMS:
         raise DesignError(
-            f"has more than {MOST_ITEMS:,} entities and settings; save a drawing of the outline "
-            "alone"
+            f"has more than {MOST_ITEMS:,} entities and settings; save a drawing of only the "
+            "outline"
         )
 
 
@@ -99,11 +99,11 @@ def _drawing(path: Path) -> tuple[Drawing, Modelspace]:
         return drawing, drawing.modelspace()
     except Exception:
         # A damaged file fails anywhere in the parser, with any of the built-in errors.
-        raise DesignError("is not a sound DXF file; save it again as DXF R2010") from None
+        raise DesignError("is not a valid DXF file; save it again as DXF R2010") from None
 
 
 def _shown(drawing: Drawing, space: Modelspace, layer: str | None, is_plot: bool) -> list[Any]:
-    """The entities that count; lettering and the like do not."""
+    """Yield the entities that count; text and the like do not."""
 
     def is_shown(entity: Any) -> bool:
         if not (entity.dxf.is_supported("layer") and entity.dxf.is_supported("invisible")):
@@ -126,7 +126,7 @@ def _shown(drawing: Drawing, space: Modelspace, layer: str | None, is_plot: bool
         drawn = [entity for entity in every if is_plotted(_layer(entity))]
     shown = [entity for entity in drawn if is_shown(entity)]
     if drawn and not shown:
-        raise DesignError("holds hidden entities only; thaw and switch on the outline's layer")
+        raise DesignError("has only hidden entities; thaw and switch on the outline's layer")
     return shown
 
 
@@ -140,7 +140,7 @@ def _polylines(shown: list[Any], factor: float) -> Iterator[Polyline]:
         kind = entity.dxftype()
         if kind not in READERS:
             raise DesignError(
-                f"holds an entity {kind}, which is not read; explode blocks and the like to lines, "
+                f"has the unsupported entity {kind}; explode blocks and the like to lines, "
                 "arcs and curves, or delete it"
             )
         try:
@@ -149,24 +149,22 @@ def _polylines(shown: list[Any], factor: float) -> Iterator[Polyline]:
             raise
         except Exception:
             # Missing values of a damaged entity may raise anything.
-            raise DesignError(f"holds a damaged {kind}; draw it again") from None
+            raise DesignError(f"has a damaged {kind}; draw it again") from None
         for height in heights:
             level = height if level is None else level
             if not abs(height - level) * factor <= LEVEL:
                 raise DesignError(
-                    f"holds a {kind} at z {height:g} where another point is at z {level:g}; lay "
-                    "the whole outline flat"
+                    f"has a {kind} at z {height:g}, but another point at z {level:g}; flatten "
+                    "the whole outline"
                 )
         yield chain
 
 
 def _side(entity: Any) -> float:
-    """1, or -1 for an entity drawn on the back of the plane (its x runs the other way)."""
+    """Return 1, or -1 for an entity drawn on the back of the plane (its x is reversed)."""
     x, y, z = entity.dxf.extrusion
     if abs(x) > LEVEL or abs(y) > LEVEL or abs(abs(z) - 1) > LEVEL:
-        raise DesignError(
-            f"holds a {entity.dxftype()} that is tilted out of the xy plane; lay it flat"
-        )
+        raise DesignError(f"has a {entity.dxftype()} tilted out of the xy plane; flatten it")
     return 1.0 if z > 0 else -1.0
 
 
@@ -185,7 +183,7 @@ def _round(entity: Any, factor: float) -> Read:
     place(first, last)
     place(radius, 0.0)
     if radius <= 0:
-        raise DesignError(f"holds a {entity.dxftype()} of radius {radius:g}; delete it")
+        raise DesignError(f"has a {entity.dxftype()} of radius {radius:g}; delete it")
     turn = (last - first) % math.tau or math.tau
     middle = place(side * centre.x * factor, centre.y * factor)
     chain = elliptical_arc(middle, (side * radius, 0.0), (0.0, radius), first, first + turn)
@@ -202,7 +200,7 @@ def _ellipse(entity: Any, factor: float) -> Read:
         place(v.x * factor, v.y * factor) for v in (tool.center, tool.major_axis, tool.minor_axis)
     )
     if min(math.hypot(*major), math.hypot(*minor)) == 0:
-        raise DesignError("holds an ELLIPSE without width; delete it")
+        raise DesignError("has an ELLIPSE without width; delete it")
     # A rising axis means a tilted ellipse.
     heights = [tool.center.z, tool.center.z + tool.major_axis.z]
     return elliptical_arc(centre, major, minor, first, first + turn), heights
@@ -218,7 +216,7 @@ def _polyline(entity: Any, factor: float) -> Read:
     else:
         flat, is_closed = entity.is_2d_polyline, entity.is_closed
         if not (flat or entity.is_3d_polyline):
-            raise DesignError("holds a POLYLINE that is a mesh; draw the outline alone")
+            raise DesignError("has a POLYLINE that is a mesh; draw only the outline")
         # Flag 16 marks the frame points of a curve-fitted polyline, which it does not pass through.
         rows = [
             (point, vertex.dxf.get("bulge", 0.0))
@@ -237,8 +235,8 @@ def _spline(entity: Any, factor: float) -> Read:
     refuse_more_than_limit(max(len(entity.control_points), len(entity.fit_points)))
     if entity.dxf.degree > HIGHEST_DEGREE:
         raise DesignError(
-            f"holds a SPLINE of degree {entity.dxf.degree}, where at most {HIGHEST_DEGREE} is "
-            "allowed; draw it with degree 3"
+            f"has a SPLINE of degree {entity.dxf.degree}; the limit is {HIGHEST_DEGREE}; draw it "
+            "with degree 3"
         )
     tool = entity.construction_tool()
     for point in tool.control_points:

@@ -1,7 +1,7 @@
 """The polylines of a plain SVG drawing, in mm and with y upward.
 
 Paths and basic shapes are read, in groups, with their transforms. Elements, attributes and styles
-that do not change a shape are listed here; a drawing with any other is refused.
+that do not change a shape are listed here; a drawing with others is refused.
 """
 
 from __future__ import annotations
@@ -32,13 +32,12 @@ _NUMBER = re.compile(NUMBER, re.ASCII)
 
 
 def svg_polylines(path: Path, layer: str | None = None) -> tuple[Iterator[Polyline], str]:
-    """Return every path and basic shape that is drawn, transforms applied, and the size of its unit
-    as text. Raises DesignError.
+    """Return every drawn path and basic shape, with transforms applied, and the size of its unit as
+    text. Raises DesignError.
 
-    Only shapes in the group with the label or id ``layer`` count if it is given.
-
-    The origin is the origin of the user coordinates, wherever the viewBox begins. A page without a
-    size in mm, cm or the like is read as 1 unit = 1 mm.
+    Only shapes in the group with the label or id ``layer`` count if it is given. The origin is that
+    of the user coordinates, regardless of the viewBox. A page without a size in mm, cm or the like
+    is read as 1 unit = 1 mm.
     """
     root = _root(path)
     groups = [element for element in root.iter() if local(element) in GROUPS]
@@ -98,7 +97,7 @@ library would mirror one; a line of zero length between them prevents it."""
 
 
 def _sound(pattern: re.Pattern[str], text: str, what: str, remedy: str) -> str:
-    """Return a text that matches, as the library reads it. Raises DesignError where it does not."""
+    """Return a text that matches, in the library's format. Raises DesignError otherwise."""
     match = pattern.match(text)
     end = match.end() if match else 0
     if end < len(text):
@@ -119,7 +118,7 @@ _FIT = re.compile(r"x(?:Min|Mid|Max)Y(?:Min|Mid|Max)(?:\s+meet)?", re.ASCII)
 
 
 def _unit(root: ElementTree.Element) -> tuple[float, str]:
-    """Return mm per user unit by width, height and viewBox, and as text. Raises DesignError."""
+    """Return mm per user unit from width, height and viewBox, and as text. Raises DesignError."""
     if not _FIT.fullmatch(root.get("preserveAspectRatio", "xMidYMid").strip(WHITE)):
         raise DesignError("has a preserveAspectRatio that stretches or crops it; remove that")
     sizes = [_page_size(root, key) for key in ("width", "height")]
@@ -229,7 +228,7 @@ def local(element: ElementTree.Element) -> str:
 def _root(path: Path) -> ElementTree.Element:
     text = read_text(path, MOST_BYTES)
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
-        raise DesignError("declares a DOCTYPE or entities; save it as plain SVG without them")
+        raise DesignError("has a DOCTYPE or entities; save it as plain SVG without them")
     if "<?xml-stylesheet" in text:
         raise DesignError(f"refers to a style sheet of another file; {PLAIN}")
     try:
@@ -241,7 +240,7 @@ def _root(path: Path) -> ElementTree.Element:
     for count, element in enumerate(root.iter(), start=1):
         if count > MOST_ELEMENTS:
             raise DesignError(
-                f"has more than {MOST_ELEMENTS} elements; save a drawing of the outline alone"
+                f"has more than {MOST_ELEMENTS} elements; save a drawing of only the outline"
             )
         if local(element) in CHANGING:
             raise DesignError(f"holds <{local(element)}>; {PLAIN}")
@@ -256,7 +255,7 @@ def _root(path: Path) -> ElementTree.Element:
 
 
 def _names(element: ElementTree.Element) -> list[str]:
-    """The label and the id of a group."""
+    """Return the label and the id of a group."""
     names = element.get(LABEL), element.get("id")
     return [name for name in names if name] if local(element) in GROUPS else []
 
@@ -328,9 +327,7 @@ def _polylines(drawn: list[tuple[ElementTree.Element, str]], scale: float) -> It
             raise
         except Exception:
             # Extremely large numbers fail anywhere in the library, with any built-in error.
-            raise DesignError(
-                f"holds a <{local(element)}> that cannot be read; draw it again"
-            ) from None
+            raise DesignError(f"has an unreadable <{local(element)}>; draw it again") from None
 
         def point(p: Any, matrix: Any = matrix) -> Point:
             x, y = matrix.point_in_matrix_space(p)
@@ -373,13 +370,15 @@ def _segments(element: ElementTree.Element) -> list[Any]:
 
 def _refuse_length(name: str, key: str, text: str) -> None:
     if text and (_NUMBER.fullmatch(text) is None or not math.isfinite(float(text))):
-        raise DesignError(f'has {key} "{text[:40]}" on <{name}>, no coordinate; {PLAIN}')
+        raise DesignError(
+            f'has {key} "{text[:40]}" on <{name}>, which is not a coordinate; {PLAIN}'
+        )
     if text and key in SIZES and float(text) < 0:
         raise DesignError(f"has <{name}> with {key} {text}, which is negative")
 
 
 def _path_data(text: str) -> str:
-    """Return the data of a path as the library reads it. Raises DesignError if it is damaged."""
+    """Return the data of a path in the library's format. Raises DesignError if it is damaged."""
     text = text.strip(WHITE).removeprefix("none")
     # A letter and seven numbers make the longest segment, an arc; a closing is its letter alone.
     closings = text.count("z") + text.count("Z")

@@ -24,18 +24,18 @@ FARTHEST = 10_000.0
 
 
 def place(x: float, y: float) -> Point:
-    """A point of a drawing. Raises DesignError unless it is finite and of a sensible size."""
+    """Return a point of a drawing. Raises DesignError unless it is finite and within limits."""
     if not abs(x) <= FARTHEST or not abs(y) <= FARTHEST:
         raise DesignError(
-            f"has a coordinate of x {x:g}, y {y:g} mm, where at most {FARTHEST:g} is allowed; "
-            "check its units"
+            f"has a coordinate of x {x:g}, y {y:g} mm; the limit is {FARTHEST:g} mm; check its "
+            "units"
         )
     # Adding 0 makes -0 a plain 0.
     return float(x) + 0.0, float(y) + 0.0
 
 
 def nothing_on(layer: str, others: Iterable[str]) -> DesignError:
-    """Return the error for an empty layer, with the names of ``others`` that are not."""
+    """Return the error for an empty layer, with the names of ``others`` that have content."""
     names = ", ".join(sorted({*others}))
     hint = f"paths lie on {names}" if names else "no layer has any"
     return DesignError(f"has no paths on a layer {layer!r}; {hint}")
@@ -56,7 +56,7 @@ def refuse_more_than_limit(edges: int, most: int = MOST_EDGES) -> None:
 
 
 def polyline(vertices: Sequence[tuple[float, float, float]], closed: bool) -> Polyline:
-    """Lines and arcs through vertices of x, y and bulge."""
+    """Return lines and arcs through vertices of x, y and bulge."""
     points = [(x, y) for x, y, _ in vertices]
     ends = [*points[1:], *points[:1]] if closed else points[1:]
     edges: list[Edge] = []

@@ -1,7 +1,7 @@
 """Records of a design file: the sections that all families share, and the form of an actuator.
 
-Every field has the paper's value as default (paper Sec. 2) or, if the paper is silent, ours, and
-says so. Lengths are mm.
+Every field has the paper's value as default (paper Sec. 2) or, if the paper gives none, ours,
+marked as such. Lengths are mm.
 """
 
 from __future__ import annotations
@@ -72,10 +72,7 @@ if TYPE_CHECKING:
 
 
 def card(title: str, symbol: str) -> ConfigDict:
-    """Return the form's entries for a family: a few words, and a drawing.
-
-    ``symbol`` is SVG path data in a box 54 wide and 40 high. Both are in the JSON schema.
-    """
+    """Return the form's entries for a family: a few words, and a drawing."""
     return ConfigDict(title=title, json_schema_extra={"symbol": symbol})
 
 
@@ -127,7 +124,7 @@ class Design(Section):
 
     @property
     def folder(self) -> Path:
-        """Folder of the design's file, for relative paths."""
+        """The folder of the design's file, for relative paths."""
         return self._folder
 
     @property
@@ -147,7 +144,7 @@ class Design(Section):
 
     @property
     def layer_films(self) -> dict[int, str]:
-        """Films named by single layers, by the layer's index; else the role's film in ``layup``."""
+        """The films of single layers, by layer index; others take the role's film in ``layup``."""
         return {}
 
     @property
@@ -164,7 +161,7 @@ class Design(Section):
     def stated_bonds(self) -> tuple[FaceBond, ...]:
         """Faces that bond, and the process; empty if not stated.
 
-        Raises DesignError for a face of no film.
+        Raises DesignError for a face that does not belong to a film.
         """
         bonds = {} if self.face_bonds is None else self.face_bonds.by_name
         faces = self.films.face_names if bonds else frozenset()
@@ -172,8 +169,8 @@ class Design(Section):
             strange = next((face for face in bond.faces if face not in faces), None)
             if strange is not None:
                 raise DesignError(
-                    f"face_bonds.{name}.faces names {shown(strange)}, a face that no film has; "
-                    f"there are {listed(sorted(faces))}"
+                    f"face_bonds.{name}.faces names {shown(strange)}, which is not the face of a "
+                    f"film; use {listed(sorted(faces))}"
                 )
         return tuple(
             FaceBond(name, bond.faces, bond.by, bond.temperature_c, bond.after)
@@ -182,22 +179,22 @@ class Design(Section):
 
     @property
     def seam_offsets(self) -> dict[str, tuple[float, float]]:
-        """Offsets, mm, of the tools that are not at their machine's head, by the tools' names."""
+        """Offsets, mm, of tools mounted beside their machine's head, by the tools' names."""
         return {} if self.seam_tools is None else self.seam_tools.offsets
 
     @property
     def thickest_pin(self) -> float:
-        """Diameter of the thickest dowel pin that the design may need, mm."""
+        """The diameter of the thickest dowel pin that the design may need, mm."""
         return max(self.bore.pin, self.registration.pin_diameter)
 
     @property
     def pin_error(self) -> float:
-        """Largest displacement of a layer on several pins, mm."""
+        """The largest displacement of a layer on several pins, mm."""
         return self._error_on(pin_error)
 
     @property
     def lone_pin_error(self) -> float:
-        """Largest displacement of a layer on a single pin, whose place does not count, mm."""
+        """The largest displacement of a layer on a single pin, without its position error, mm."""
         return self._error_on(lone_pin_error)
 
     def _error_on(self, pins: Callable[[float, PlateMachine], float]) -> float:
@@ -214,14 +211,14 @@ class Design(Section):
 
     @property
     def kerf_widths(self) -> dict[Material, Kerf | None]:
-        """Full kerf width (or that along x and y) by material, None if not measured."""
+        """The full kerf width (or widths along x and y) by material, None if not measured."""
         kerfs = {"TPE": self.laser.kerf_tpe, "PTFE": self.laser.kerf_ptfe}
         kerfs |= {material(name): film.kerf for name, film in self.films.by_name.items()}
         return {name: None if isinstance(kerf, str) else kerf for name, kerf in kerfs.items()}
 
     @property
     def strip_width(self) -> float:
-        """Width of the inlet strips, mm: as given, or the least that opens to the tube.
+        """The width of the inlet strips, mm: as given, or the least that opens to the tube.
 
         A flat channel opens to half the perimeter of its content: the tube, and the PTFE strip
         along one side of it (rule tube-fit). Rounded up to 0.05 mm.
@@ -233,16 +230,16 @@ class Design(Section):
 
     @property
     def strip_loss(self) -> float:
-        """Width by which a cut strip may be narrower than drawn, mm, for any kerf.
+        """The width by which a cut strip may be narrower than drawn, mm, for any kerf.
 
-        A kerf that is measured later changes no strip.
+        A later kerf measurement changes no strip.
         """
         return 2 * self.registration.cutting_error + self.laser.unknown_kerf
 
     @property
     @abstractmethod
     def form(self) -> Form:
-        """Form of the actuator, for models, checks and pages. Raises DesignError."""
+        """The form of the actuator, for models, checks and pages. Raises DesignError."""
 
     @classmethod
     def uses(cls, key: str) -> bool:
@@ -260,7 +257,7 @@ class Design(Section):
 
     @property
     def free(self) -> tuple[Free, ...]:
-        """Keys that a search may change by default; a family adds its own."""
+        """The keys that a search may change by default; a family adds its own."""
         most, bond, reach = self.rules.validated_balloons, self.rules.bond_width, self.mask.overhang
         return (
             Free("stack.balloons", 2, most, 1),
@@ -273,11 +270,11 @@ class Design(Section):
         )
 
     def drawn_shapes(self) -> Mapping[str, Region | None]:
-        """Return the shapes that the design file names; None for one that cannot be made."""
+        """Return the shapes that the design file names; None for an invalid one."""
         return {}
 
     def drawn_from(self, key: str, file: str) -> Self:
-        """Return the design with another file under one of the keys of ``drawings``."""
+        """Return the design with another file for one of the keys of ``drawings``."""
         assert key == OUTLINE, key
         chamber = self.chamber.model_copy(update={"outline": file})
         return self.model_copy(update={"chamber": chamber})
@@ -348,7 +345,7 @@ Pockets = Discs | Slots | Drawn
 
 
 class Wrap(Section):
-    """The tube that the finished laminate is wrapped round."""
+    """The tube around which the finished laminate is wrapped."""
 
     outer_diameter: Length
     """Diameter of the tube."""
@@ -364,9 +361,7 @@ MechanismKind = Literal["pouch-motor", "hinge", "beam", "jamming", "push"]
 
 
 class Mechanism(Section):
-    """Action of the pockets when they fill, for the closed forms of ``predict``; none by
-    default.
-    """
+    """The action of the pockets when filled, for the closed forms of ``predict``, if any."""
 
     kind: MechanismKind
     """"pouch-motor" pulls, "hinge" bends two plates, "beam" bears a load at its end, "jamming"
@@ -391,8 +386,8 @@ class Form:
 
     ``words`` is a technician's name for it; ``stacks`` of balloons stand side by side, all with the
     same ``pockets``; ``lumen`` is the diameter in mm of the channel through all layers,
-    ``lumen_pin`` its dowel pin's; ``mechanism`` the action of drawn pockets, if stated.
-    ``is_drawn``: every layer is drawn, so that the paper's handling times do not carry over.
+    ``lumen_pin`` that of its dowel pin; ``mechanism`` the action of drawn pockets, if stated.
+    ``is_drawn``: every layer is drawn, so the paper's handling times do not apply.
     """
 
     words: str
@@ -486,7 +481,7 @@ def changed(design: AnyDesign, changes: Iterable[Change]) -> AnyDesign:
 def validated(
     data: Mapping[str, Any], families: Mapping[str, type[AnyDesign]], folder: Path
 ) -> AnyDesign:
-    """Return the design record of the family that ``data`` names.
+    """Return the design record of the family in ``data``.
 
     Raises DesignError with one sentence: field, value, allowed values, remedy.
     """
@@ -495,8 +490,8 @@ def validated(
         raise DesignError(f"family is missing; add family = one of {listed(families)}")
     if family == ASSEMBLY:
         raise DesignError(
-            f"{shown(data.get('name', folder.name))} is an assembly of several designs; it goes "
-            "with generate, check, predict and studio, and other commands take one of its designs"
+            f"{shown(data.get('name', folder.name))} is an assembly of several designs; use it "
+            "with generate, check, predict or studio, or use one of its designs"
         )
     if not isinstance(family, str) or family not in families:
         allowed = f"{'one of ' if len(families) > 1 else ''}{listed(families)}"
@@ -516,12 +511,12 @@ def resolved(design: Design) -> dict[str, Any]:
 
 
 def with_unused(design: Design) -> dict[str, Any]:
-    """Return the same including the keys that its family does not use, at their defaults."""
+    """Return the design with the keys that its family does not use, at their defaults."""
     return _tables(design.completed())
 
 
 def plain_tables(design: Design) -> dict[str, Any]:
-    """The design as tables of a TOML file, defaults that depend on other values left open."""
+    """Return the design as tables of a TOML file, without defaults that depend on other values."""
     tables = _used(_tables(design), design)
     if design.is_solved:
         del tables["chamber"]["diameter"]
@@ -544,7 +539,7 @@ def _used(tables: dict[str, Any], design: Design) -> dict[str, Any]:
 
 
 def without_none(table: dict[str, Any]) -> dict[str, Any]:
-    """Return nested tables without their keys of no value."""
+    """Return nested tables without keys that have no value."""
 
     def plain(value: Any) -> Any:
         if isinstance(value, list):
@@ -581,7 +576,7 @@ def design_toml(design: Design) -> str:
 
 
 def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
-    """Return a design's tables without what its kit or defaults say, for another kit."""
+    """Return a design's tables without the values of its kit or the defaults, for another kit."""
     kit = load_kit(design.kit, design.folder)
     kit_values = {**kit.tables, "inlet": inlet_of_kit(kit, {}, False)}
     usual = type(design).model_validate({"name": "x", "family": design.family, **kit_values})
@@ -590,7 +585,7 @@ def without_kit(data: Mapping[str, Any], design: Design) -> dict[str, Any]:
 
 
 def _less(data: Mapping[str, Any], usual: Mapping[str, Any]) -> dict[str, Any]:
-    """Values that differ from the defaults; tables that become empty are removed."""
+    """Return values that differ from the defaults; tables that become empty are removed."""
     rest: dict[str, Any] = {}
     for key, value in data.items():
         inner = usual.get(key)

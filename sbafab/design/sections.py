@@ -81,18 +81,18 @@ class OrderSection(Section):
         odds = f"at success_rate = {rate:g} and certainty = {certainty:g}"
         if needed is None:
             raise ValueError(
-                f"{odds} takes more than {MOST} builds; lower good or certainty, or split the order"
+                f"{odds} needs more than {MOST} builds; lower good or certainty, or split the order"
             )
         if 1 < info.data.get("copies", 1) < needed:
             raise ValueError(
-                f"{odds} takes {needed}, and order.copies = {info.data['copies']}; leave copies or "
-                "good out, or lower certainty"
+                f"{odds} needs {needed}, but order.copies = {info.data['copies']}; omit copies "
+                "or good, or lower certainty"
             )
         return good
 
     @property
     def quantity(self) -> int:
-        """Number of actuators that are made."""
+        """The number of actuators to make."""
         if self.good is None:
             return self.copies
         needed = builds_for(self.good, self.success_rate, self.certainty)
@@ -100,7 +100,7 @@ class OrderSection(Section):
 
     @property
     def why(self) -> str:
-        """The number made and its chances as a sentence; empty unless ``good`` is given."""
+        """The quantity and its probability of success, as text; empty unless ``good`` is given."""
         if self.good is None:
             return ""
         likely = probability_of(self.good, self.quantity, self.success_rate)
@@ -111,15 +111,16 @@ class OrderSection(Section):
         )
 
     def spare_parts(self, needed: int) -> int:
-        """Number of spares of a pattern if the actuators need ``needed`` parts of it."""
+        """Return the number of spares of a pattern if the actuators need ``needed`` parts of it."""
         return max(self.spares, math.ceil(self.spare_share * needed - ROUNDING)) if needed else 0
 
 
 def probability_of(good: int, builds: int, rate: float) -> float:
-    """Probability that at least ``good`` of ``builds`` succeed, each with probability ``rate``.
+    """Return the probability that at least ``good`` of ``builds`` succeed, each with probability
+    ``rate``.
 
     The upper tail of the binomial distribution, summed over the number of failures. Builds are
-    assumed independent, which builds of one press cycle are only in part.
+    assumed independent, which is only partly true within one press cycle.
     """
     return math.fsum(
         math.comb(builds, failed) * rate ** (builds - failed) * (1 - rate) ** failed
@@ -128,7 +129,7 @@ def probability_of(good: int, builds: int, rate: float) -> float:
 
 
 def builds_for(good: int, rate: float, certainty: float) -> int | None:
-    """Least number of builds such that ``good`` succeed with this certainty; None beyond MOST."""
+    """The least number of builds for ``good`` successes with this certainty; None beyond MOST."""
     counts = range(good, MOST + 1)
     # The probability grows with the number of builds.
     place = bisect_left(counts, certainty, key=lambda builds: probability_of(good, builds, rate))
@@ -143,7 +144,7 @@ FITTING = "blunt dispensing needle, 22 G (outer diameter 0.718 mm), Luer lock"
 
 
 def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
-    """Return the annotation for one of some names, which installed packages may extend, in
+    """Return the annotation for one of several names, which installed packages may extend, in
     validation and in the schema.
     """
 
@@ -161,14 +162,14 @@ def name_of(names: Callable[[], Sequence[str]]) -> tuple[AfterValidator, Any]:
 
 
 class Bond(Section):
-    """Bond where two structural films melt together."""
+    """The bond of two melted structural films."""
 
     width: Length = 0.75
     """Width of every bonded ring, web and strip edge."""
 
 
 class Mask(Section):
-    """The Teflon that keeps films apart."""
+    """The PTFE film that separates films."""
 
     overhang: Length = 0.5
     """Distance by which a mask reaches past the edges of the TPE layers it keeps apart."""
@@ -188,7 +189,7 @@ class Bore(Section):
 
     @property
     def pin(self) -> float:
-        """Diameter of the bore's dowel pin."""
+        """The diameter of the bore's dowel pin."""
         if self.pin_diameter is not None:
             return self.pin_diameter
         return round(max(self.diameter - self.clearance, self.diameter / 2), 6)
@@ -202,7 +203,7 @@ class Fillet(Section):
 
 
 class Inlet(Section):
-    """Tab, strip and tube through which a chamber is filled."""
+    """The tab, strip and tube through which a chamber is filled."""
 
     tube: str = Field(default="Braintree RPT040", max_length=80)
     """The tubing to order."""
@@ -278,11 +279,11 @@ class Registration(Section):
 
     @property
     def hole_diameter(self) -> float:
-        """Diameter of the holes in ears and tails."""
+        """The diameter of the holes in ears and tails."""
         return self.pin_diameter + self.pin_clearance
 
     def error_of_seam(self, tool: SeamTool) -> float:
-        """Return the most by which a seam of a tool lies off its path, mm."""
+        """Return the largest displacement of a tool's seam from its path, mm."""
         if self.seam_error is not None:
             return self.seam_error
         return self.cutting_error if tool == "laser" else GUIDED_TOOL
@@ -292,7 +293,7 @@ MountCoordinate = Annotated[float, Millimetres(-500, 500)]
 
 
 class SeamToolSection(Section):
-    """Mounting of a tool for seams on its machine."""
+    """The mounting of a seam tool on its machine."""
 
     offset: Annotated[tuple[MountCoordinate, MountCoordinate], Field(strict=False)]
     """Position of its middle, x and y from the laser or pen head that sets the machine's origin.
@@ -300,7 +301,7 @@ class SeamToolSection(Section):
 
 
 class SeamTools(Section):
-    """Tools for seams that are not mounted in place of the machine's head."""
+    """Seam tools that are not mounted in place of the machine's head."""
 
     laser: SeamToolSection | None = None
     """The laser."""
@@ -328,7 +329,7 @@ LONGEST_CONSTANT = 120.0
 def named_film(text: str) -> tuple[str, float]:
     """Return product and thickness (mm) of a text such as "Stretchlon 200, 0.038 mm".
 
-    Raises ValueError with a sentence on the allowed form.
+    Raises ValueError with a sentence about the allowed form.
     """
     product, _, thickness = text.rpartition(",")
     try:
@@ -421,27 +422,27 @@ class Press(Section):
 
     @property
     def platen(self) -> tuple[float, float]:
-        """Heated area, mm x mm."""
+        """The heated area, mm x mm."""
         return self.platen_width, self.platen_length
 
     @property
     def platen_area(self) -> float:
-        """Heated area, mm2."""
+        """The heated area, mm2."""
         return self.platen_width * self.platen_length
 
     @property
     def force_n(self) -> float:
-        """Force on the whole platen."""
+        """The force on the whole platen."""
         return self.pressure_kpa * self.platen_area / 1000
 
     @property
     def timed_films(self) -> tuple[tuple[str, float], ...]:
-        """Product and thickness, mm, of the films that the minutes were stated for."""
+        """The product and thickness, mm, of the films for which the minutes are stated."""
         return tuple(map(named_film, self.minutes_for))
 
 
 class Acceptance(Section):
-    """Working pressure of an actuator, and its tests before delivery: all ours except the burst
+    """Working pressure of an actuator, and its tests before delivery: our values except the burst
     pressure.
     """
 
@@ -472,7 +473,7 @@ HoldDown = Literal["border", "carrier", "vacuum"]
 
 
 class Laser(Section):
-    """The laser: its limits, its kerf, film holding, speeds for estimates."""
+    """The laser: its limits, kerf, film fixing, and speeds for estimates."""
 
     least_feature: Length = 0.2
     """The narrowest slot or web the laser cuts well."""
@@ -517,7 +518,7 @@ class Laser(Section):
 
 
 class Sheets(Section):
-    """The film sheets to cut from, and how parts are placed on them."""
+    """The film sheets to cut, and the placement of parts on them."""
 
     tpe: Sheet = Sheet.model_construct()
     ptfe: Sheet = Sheet.model_construct()
@@ -559,8 +560,8 @@ class Rules(Section):
 
     @property
     def validated_height(self) -> float:
-        """Height in mm of as many balloons of the paper's films as are validated: a key of its own
-        would change the hash of every design.
+        """The height in mm of the validated number of balloons in the paper's films. It is no key,
+        since a new key would change the hash of every design.
         """
         return 0.125 * self.validated_balloons
 
@@ -574,17 +575,17 @@ class Rules(Section):
 
     @property
     def channels_open_at_kpa(self) -> float:
-        """Pressure at which a channel of a net must open."""
+        """The pressure at which a channel of a net must open."""
         return self.opening_pressure_kpa or 100.0
 
     @property
     def longest_dead_end(self) -> float:
-        """Largest ratio of length to width of a blind branch of a net."""
+        """The largest ratio of length to width of a dead-end branch of a net."""
         return self.dead_end or 2.0
 
 
 class Models(Section):
-    """Basis of predictions."""
+    """The basis of predictions."""
 
     calibration: str = Field(default="paper", min_length=1, max_length=1000)
     """The calibration of the models: "paper", a file beside the design that sbafab calibrate wrote,
@@ -592,7 +593,7 @@ class Models(Section):
 
 
 class Stack(Section):
-    """Height of the actuator."""
+    """The height of the actuator."""
 
     balloons: int = Field(default=6, ge=1, le=1000)
     """Balloons in each chamber, bottom to top."""

@@ -1,4 +1,4 @@
-"""A table of a design file, of an assembly's or of a kit's."""
+"""A table of a design file, an assembly file or a kit."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ PATTERNS = {
 
 
 class Section(Described):
-    """A frozen table of a design file that knows all its keys.
+    """A frozen table of a design file with a fixed set of keys.
 
-    Texts appear in pictures, pages and tables, so characters that cannot be written there are not
+    Texts appear in pictures, pages and tables, so characters that these cannot show are not
     allowed.
     """
 
@@ -45,9 +45,7 @@ class Section(Described):
 
 
 class NamedTables(Section):
-    """A table whose keys are names that the user chooses; a record states their type as
-    ``__pydantic_extra__``.
-    """
+    """A table with keys chosen by the user; their type is in ``__pydantic_extra__``."""
 
     model_config = ConfigDict(extra="allow")
     what: ClassVar[str]
@@ -67,7 +65,7 @@ class NamedTables(Section):
                 )
         if len(self.by_name) > self.most:
             count = len(self.by_name)
-            raise ValueError(f"has {count} {self.what}s; at most {self.most} may be")
+            raise ValueError(f"has {count} {self.what}s; the limit is {self.most}")
         return self
 
     @property
@@ -76,11 +74,11 @@ class NamedTables(Section):
 
 
 def writable(value: object) -> object:
-    """Return the value. Raises ValueError for a text that pages and pictures cannot hold."""
+    """Return the value. Raises ValueError for a text that pages and pictures cannot show."""
     match = _UNWRITABLE.search(value) if isinstance(value, str) else None
     if match is not None:
         raise ValueError(
             f"must be plain text; remove the character U+{ord(match[0]):04X} "
-            f"at place {match.start() + 1}"
+            f"at position {match.start() + 1}"
         )
     return value

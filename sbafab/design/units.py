@@ -1,4 +1,4 @@
-"""Lengths as people write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; also moduli,
+"""Lengths as users write them: ``0.75``, ``"0.75 mm"``, ``"6 in"``, ``"38 um"``; also moduli,
 densities and temperatures; units of pressure and flow.
 """
 
@@ -41,22 +41,22 @@ MEASURED = re.compile(rf"\s*([-+]?{_NUMBER})\s*(\S*)\s*")
 
 
 def in_first_unit(text: str, units: Mapping[str, float]) -> float | None:
-    """Return the number of a text in the first of ``units``; None for other text."""
+    """Return the number in a text, in the first of ``units``; None for other text."""
     written = MEASURED.fullmatch(text)
     size = written and units.get(written[2] or next(iter(units)))
     return float(written[1]) * size if written and size is not None else None
 
 
 def share_of(text: str) -> float | None:
-    """Return the share of a text such as 0.95 or 95%; None for other text."""
+    """Return the fraction in a text such as 0.95 or 95%; None for other text."""
     number = in_first_unit(text, {"": 1.0, "%": 0.01})
     return None if number is None else round(number, 12)
 
 
 def millimetres(value: object) -> float:
-    """A length in mm from a number (mm) or a text with a unit.
+    """Return a length in mm from a number (mm) or a text with a unit.
 
-    Raises ValueError with a sentence on the allowed form.
+    Raises ValueError with a sentence about the allowed form.
     """
     if isinstance(value, str):
         read = in_first_unit(value, MILLIMETRES)
@@ -74,17 +74,17 @@ def millimetres(value: object) -> float:
 
 @dataclass(frozen=True)
 class Millimetres:
-    """Parser of a length in mm, with its allowed range.
+    """Parser of a length in mm with an allowed range.
 
-    To be used as ``Annotated[float, Millimetres(least, most)]``; the JSON schema has the same range
-    for numbers, and texts with a unit.
+    Use it as ``Annotated[float, Millimetres(least, most)]``; the JSON schema allows numbers in this
+    range, and texts with a unit.
     """
 
     least: float
     most: float
 
     def read(self, value: object) -> float:
-        """Raises ValueError with a sentence on the allowed form."""
+        """Return the length. Raises ValueError with a sentence about the allowed form."""
         length = millimetres(value)
         if length < self.least:
             raise ValueError(f"must be at least {self.least:g} mm")
@@ -105,17 +105,17 @@ class Millimetres:
 
 @dataclass(frozen=True, eq=False)
 class InUnit:
-    """Parser of a number, alone in the first of ``units`` or with one of them: their sizes in the
-    first. ``example`` is such a text.
+    """Parser of a number with an optional unit; without one it is in the first of ``units``.
 
-    To be used as ``Annotated[float, Field(gt=0), InUnit(...)]``; the JSON schema has both.
+    ``units`` gives their sizes in the first one; ``example`` is such a text. Use it as
+    ``Annotated[float, Field(gt=0), InUnit(...)]``; the JSON schema has both forms.
     """
 
     units: Mapping[str, float]
     example: str
 
     def read(self, value: object) -> object:
-        """Raises ValueError with a sentence on the allowed form."""
+        """Return the number. Raises ValueError with a sentence about the allowed form."""
         if not isinstance(value, str):
             return value
         number = in_first_unit(value, self.units)
@@ -144,7 +144,7 @@ UNITS = (*MILLIMETRES, *MEGAPASCALS.units, *CELSIUS.units, *DENSITIES.units)
 
 
 def is_measured(text: str) -> bool:
-    """Return True for the text of a number, alone or with a unit that files take."""
+    """Return True for the text of a number, with or without a unit that files accept."""
     written = MEASURED.fullmatch(text)
     return written is not None and written[2] in ("", *UNITS)
 

@@ -77,11 +77,11 @@ PICTURES: tuple[RunPart, ...] = ("preview",)
 class DesignFolder:
     """The folder of a build while its ``wanted`` parts are written.
 
-    ``sheets`` are the film sheets of its pieces, ``has_pages``: whether findings and a traveller
-    belong into it. ``conforming`` is written in the ``formats`` of these file endings;
-    ``simulated`` is the folder in which a simulator has run. Writers add the ``meshes`` they wrote,
-    to ``verified`` the sha256 of each cut file that was read back, and to ``left_out`` the meshes
-    and the inputs of simulators that could not be, with the reason.
+    ``sheets`` are the film sheets of its pieces; ``has_pages``: it includes findings and a
+    traveller. ``conforming`` is written in the ``formats`` of these file suffixes; ``simulated`` is
+    the folder of a finished simulation. Writers add written ``meshes``, add to ``verified`` the
+    sha256 of each cut file read back, and to ``left_out`` the meshes and simulator inputs that
+    could not be written, with the reason.
     """
 
     build: Build
@@ -116,12 +116,12 @@ class DesignFolder:
 
     @cached_property
     def work(self) -> Any:
-        """The ``Work`` that the pages for the bench show."""
+        """The ``Work`` for the bench pages."""
         return work_of(self.build, self.sheets)
 
     @cached_property
     def solid_png(self) -> bytes:
-        """The picture of the solid, which the traveller shows as well."""
+        """The picture of the solid, which also appears in the traveller."""
         picture: bytes = plugins.load("sbafab.reports.solid_pictures:solid_png")(self.marked)
         return picture
 
@@ -138,10 +138,11 @@ def _remarks(findings: Sequence[Finding]) -> list[str]:
 class Artefact:
     """A file or folder of a design's folder.
 
-    ``part`` of a run has it written, "" every run; ``needs``: further parts; without them it is
-    left out. ``render`` returns the file's contents, or writes a folder itself and returns None;
-    without one it is written for all designs of a job together. ``schema``: the id of its format,
-    if programs may rely on it. ``is_page``: an assembly has one for all its designs.
+    ``part`` is the part of a run that writes it, "" for every run; it is omitted unless the parts
+    ``needs`` are present. ``render`` returns the file's contents, or writes a folder itself and
+    returns None; without it the file is written for all designs of a job together. ``schema``: the
+    id of its format, if programs may rely on it. ``is_page``: an assembly has one for all its
+    designs.
     """
 
     path: str
@@ -154,11 +155,11 @@ class Artefact:
 
     @property
     def top(self) -> str:
-        """The file or folder in the design's folder that it is or lies in."""
+        """The top-level file or folder in the design's folder."""
         return self.path.partition("/")[0]
 
     def belongs_in(self, folder: DesignFolder) -> bool:
-        """Return True if the folder's plan asks for it."""
+        """Return True if the folder's plan includes it."""
         is_wanted = not self.part or (self.part in folder.wanted and self.needs <= folder.wanted)
         return is_wanted and (folder.has_pages or not self.is_page)
 
@@ -172,7 +173,7 @@ def made_by(
     is_made: Callable[[DesignFolder], bool] = lambda folder: True,
 ) -> Callable[[DesignFolder], str | bytes | None]:
     """Return a row's ``render``: the function that an entry names, ``module:function``, called with
-    what the folder gives; None for a folder that does not need the file.
+    the folder's values; None for a folder that does not need the file.
     """
 
     def render(folder: DesignFolder) -> str | bytes | None:
@@ -223,7 +224,7 @@ def write_artefacts(folder: DesignFolder, rows: Iterable[Artefact] | None = None
 
 
 def tops_of(*parts: RunPart) -> tuple[str, ...]:
-    """Return the files and folders that runs of these parts write, but for pictures."""
+    """Return the files and folders that runs of these parts write, except pictures."""
     return tuple(dict.fromkeys(row.top for row in artefacts() if row.part in parts))
 
 
@@ -247,7 +248,7 @@ def _write_layers(folder: DesignFolder) -> None:
 def write_nested_sheets(
     nests: Sequence[Nest], design: Design, folder: Path, settings: CutSettings, progress: Progress
 ) -> list[SheetFile]:
-    """Write the film sheets, and beside them the places for a later run; nothing for no nest."""
+    """Write the film sheets, and their placements for a later run; nothing for no nest."""
     if not nests:
         return []
     count = partial(progress, "sheets")
@@ -267,7 +268,7 @@ def _press_json(folder: DesignFolder) -> str:
 
 
 def _has_tray(folder: DesignFolder) -> bool:
-    """Return True for a batch, unless its design says otherwise."""
+    """Return True for a batch, unless its design specifies otherwise."""
     has_tray = folder.design.order.tray
     return folder.build.cycles.copies > 1 if has_tray is None else has_tray
 
@@ -321,7 +322,7 @@ def _write_plots(folder: DesignFolder) -> None:
 
 
 def _write_simulation(name: str, folder: DesignFolder) -> None:
-    """Copy a simulator's folder if it has run, else write what it reads."""
+    """Copy a simulator's folder if it has run, otherwise write its input."""
     simulated = folder.simulated
     if simulated is not None:
         shutil.copytree(simulated, folder.path / name)
@@ -344,15 +345,13 @@ def _write_simulation(name: str, folder: DesignFolder) -> None:
 
 
 def work_of(build: Build, sheets: Sequence[SheetFile], folder: str = "") -> Any:
-    """Return the ``Work`` that pages for the bench are made from; ``folder`` has the design's
-    files.
-    """
+    """Return the ``Work`` for the bench pages; ``folder`` has the design's files."""
     work = plugins.load("sbafab.reports.traveller.work:Work")
     return work(build.design, build.laminate, build.findings, build.curves, sheets, folder)
 
 
 def _design(folder: DesignFolder) -> str:
-    """Return the design as a file; the user's drawings and kit are copied beside it."""
+    """Return the design as a file; copy the user's drawings and kit beside it."""
     design = folder.design
     names: dict[Path, str] = {}
     for key, file in design.drawings.items():
@@ -481,7 +480,7 @@ _OWN: tuple[Artefact, ...] = (
 
 @cache
 def artefacts() -> tuple[Artefact, ...]:
-    """Return all files of a design's folder but its index, those of other packages last."""
+    """Return all files of a design's folder except its index, those of other packages last."""
     own_paths = [row.path for row in _OWN]
     return _OWN + plugins.added(plugins.ARTEFACTS, "output file", Artefact, own_paths)
 
@@ -508,8 +507,8 @@ def write_folder(
     """Write film sheets and designs; several designs get a folder each, named after it.
 
     ``extras`` are fields of the ``DesignFolder`` of a single design. Return the manifest without
-    its files' hashes; the sha256 of each cut file that was read back; and the meshes and inputs of
-    simulators that could not be, with the reason.
+    its files' hashes; the sha256 of each cut file that was read back; and the meshes and simulator
+    inputs that could not be written, with the reason.
     """
     parts, first = frozenset(wanted), order.builds[0]
     sheets = write_nested_sheets(nests, first.design, path, order.settings, progress)
@@ -550,21 +549,21 @@ def write_design(folder: DesignFolder) -> dict[str, Any]:
 def close_folder(folder: Path, index: dict[str, Any], verified: Mapping[str, str]) -> None:
     """Write the manifest, with the hashes of all files in the folder.
 
-    Raises DefectError if a ``verified`` file is not as it was when it was read back.
+    Raises DefectError if a ``verified`` file has changed since it was read back.
     """
     index.pop("files", None)
     index["files"] = file_hashes(folder)
     changed = [path for path, digest in verified.items() if index["files"].get(path) != digest]
     if changed:
         raise DefectError(
-            f"{changed[0]} was changed after it had been verified; this is a defect of sbafab and "
+            f"{changed[0]} was changed after its verification; this is a defect of sbafab and "
             "nothing was written: please report this sentence with the design file"
         )
     write_text(folder / "manifest.json", as_json(index))
 
 
 def _from_below(sheets: Sequence[SheetFile]) -> list[SheetFile]:
-    """Return the shared sheets as a design's own folder names them."""
+    """Return the shared sheets with paths relative to a design's own folder."""
     return [
         replace(
             sheet,
@@ -587,8 +586,8 @@ def _write_assembly(
     path: Path,
     progress: Progress,
 ) -> dict[str, Any]:
-    """Write what an assembly's folder holds beside its designs; return the keys that its manifest
-    has beside a job's.
+    """Write an assembly's own files besides its designs; return the keys that its manifest adds to
+    a job's.
     """
     progress("assembled", 0, 1)
     (path / "preview").mkdir()
@@ -621,7 +620,7 @@ def _write_assembly(
 
 
 def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
-    """``mesh/assembled.glb``, a node a part, as the manifest lists it."""
+    """Write ``mesh/assembled.glb``, one node per part, and return its manifest entry."""
     paints = colours(assembled)
     nodes = [
         Node(placed.name, placed_surface(placed), _material(placed), linear(paints[placed.name]))
@@ -643,7 +642,7 @@ def _write_solid(assembled: Assembled, folder: Path) -> dict[str, Any]:
 
 
 def _write_moulds(assembled: Assembled, folder: Path) -> None:
-    """Write both halves of the mould of every cast part, to be printed."""
+    """Write both halves of the mould of every cast part, for printing."""
     for placed in assembled.parts:
         if isinstance(placed.part, Cup):
             for half, surface in zip(("lower", "upper"), cup_mould(placed.part), strict=True):

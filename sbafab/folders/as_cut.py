@@ -1,4 +1,4 @@
-"""The layers and seams of a folder as its cut files leave them: read back, the kerf removed."""
+"""The layers and seams of a folder as its cut files define them: read back, without the kerf."""
 
 from __future__ import annotations
 
@@ -60,11 +60,11 @@ DATUM = "LINE"
 
 @dataclass(frozen=True)
 class CutPart:
-    """The part that a cut file cuts: ``region`` without the kerf, round contours as circles.
+    """The part defined by a cut file: ``region`` without the kerf, round contours as circles.
 
-    ``departure`` says how the file's path departs from the design's; empty within 1 um, and
-    ``region`` is then the design's layer. ``properties`` and ``units`` are empty if the file does
-    not state them.
+    ``departure`` describes the deviation of the file's path from the design's; empty within 1 um,
+    and ``region`` is then the design's layer. ``properties`` and ``units`` are empty if the file
+    does not state them.
     """
 
     region: Region
@@ -87,8 +87,8 @@ def read_layers(
     """Read the file of every layer of the ``expected`` laminate, equal files once; return the parts
     by layer, and problems.
 
-    Contours that agree with one of the design's become that one: programs that save a file again
-    round its coordinates, and rules would take the gap between two such edges for a bond or a leak.
+    A contour that agrees with the design's is replaced by it: programs that save a file again round
+    its coordinates, and rules would take the gap between two such edges for a bond or a leak.
     """
     read: dict[tuple[str, str, str], CutPart] = {}
     parts: dict[int, CutPart] = {}
@@ -127,7 +127,7 @@ def read_layers(
 def _property_problems(
     parts: Mapping[int, CutPart], bare: Mapping[int, str], misstated: Mapping[str, Sequence[int]]
 ) -> Iterator[Finding]:
-    """Yield files without custom properties, and differing ones joined by value."""
+    """Yield files without custom properties, and groups of files with different values."""
     if bare:
         names = [*bare.values()]
         of = f"the files of {len(bare)} layers" if len(bare) > 1 else f"the file {names[0]}"
@@ -145,7 +145,7 @@ def _property_problems(
 
 
 def property_differences(actual: Mapping[str, str], expected: Mapping[str, str]) -> list[str]:
-    """Return the custom properties of a file that are not the expected ones."""
+    """Return the custom properties of a file that differ from the expected ones."""
     return [
         f"custom property {name} is {actual.get(name)!r}, not {expected.get(name)!r}"
         for name in dict.fromkeys((*expected, *actual))
@@ -170,7 +170,7 @@ def _agree(contour: Contour, designed: Contour) -> bool:
 
 
 def departure(path: Region, expected: Region, tolerance: float = TOLERANCE) -> str:
-    """Return the difference of a path read back from the expected one; "" within 1 um."""
+    """Return the difference of a read-back path from the expected one; "" within 1 um."""
     try:
         check_contours(path, expected, tolerance)
     except OutputError as error:
@@ -209,15 +209,15 @@ def laminate_as_cut(parts: Mapping[int, CutPart], laminate: Laminate) -> Laminat
 def path_in_folder(folder: Path, file: str | None) -> Path:
     """Return the path of a file of the manifest. Raises OutputError if it is outside the folder."""
     if file is None:
-        raise OutputError("the manifest names no cut file for it; regenerate the folder")
+        raise OutputError("the manifest has no cut file for it; regenerate the folder")
     pure = PurePosixPath(file)
     if pure.is_absolute() or ".." in pure.parts or "\\" in file or "\0" in file:
-        raise OutputError("its path leads out of the folder; regenerate the folder")
+        raise OutputError("its path leaves the folder; regenerate the folder")
     return folder / pure
 
 
 def read_part(path: Path, properties: Mapping[str, str], profile: Region, beam: Region) -> CutPart:
-    """Read the part that a cut file cuts. Raises OutputError if the file is not sound.
+    """Return the part in a cut file. Raises OutputError if the file is invalid.
 
     ``profile`` and ``beam`` are the design's layer and the beam's path for it; ``properties`` are
     used if the file has none.
@@ -232,16 +232,16 @@ def read_part(path: Path, properties: Mapping[str, str], profile: Region, beam: 
     except OutputError:
         raise
     except (ArithmeticError, ValueError, LookupError) as error:
-        raise OutputError(f"holds no valid contours ({error}); regenerate it") from error
+        raise OutputError(f"has no valid contours ({error}); regenerate it") from error
     return CutPart(region, off, drawing.properties, drawing.units)
 
 
 def _without_kerf(path: Region, kerf: Kerf) -> Region:
-    """Return the part that a beam along a path leaves. Raises OutputError if none is left, or if
-    the beam has two widths, which only the design tells apart.
+    """Return the part left by a beam along a path. Raises OutputError if none is left, or if the
+    beam has two widths, which only the design distinguishes.
     """
     if isinstance(kerf, tuple) and kerf[0] != kerf[1]:
-        raise OutputError("cut with another path than the design's by a kerf along x and y")
+        raise OutputError("its path differs from the design's, and the kerf has two widths")
     region = with_circles(_without_specks(shrink(with_circles(path), max(widths(kerf)) / 2)))
     if region.is_empty:
         raise OutputError(f"nothing is left inside a kerf of {kerf_text(kerf)} mm; regenerate it")
@@ -255,7 +255,7 @@ def _check_drawn(drawing: ReadBack) -> None:
         if kind != DATUM:
             raise OutputError(
                 f"a {kind} lies on a layer other than {CUT_INNER} and {CUT_OUTER}, so it would "
-                "not be cut in its turn; move it"
+                "be cut out of order; move it"
             )
     check_datum(drawing)
     check_sequence(drawing)
@@ -264,11 +264,10 @@ def _check_drawn(drawing: ReadBack) -> None:
 def read_seams(
     folder: Path, designed: Sequence[Seam], settings: CutSettings
 ) -> tuple[tuple[Seam, ...], list[Finding]]:
-    """Return the seams as their files draw them, and problems.
+    """Return the seams as drawn in their files, and problems.
 
-    A path within a micrometre of the design's is replaced by it. Each seam lies where its tool
-    runs when the machine's head follows the file; the design states the tool's offset from the
-    head.
+    A path within a micrometre of the design's is replaced by it. Each seam lies on its tool's path
+    when the machine's head follows the file; the design states the tool's offset from the head.
     """
     seams: list[Seam] = []
     problems: list[Finding] = []
@@ -303,7 +302,7 @@ def read_seams(
 
 
 def with_circles(region: Region) -> Region:
-    """Return the region with circles for contours that stay within TOLERANCE of one."""
+    """Return the region with circles for contours within TOLERANCE of one."""
     return Region(tuple(map(_rounded, region.contours)))
 
 
@@ -342,7 +341,7 @@ def _without_contour_specks(contour: Contour) -> Contour:
 
 
 def refuse_coarse(build: Build) -> None:
-    """Raise DesignError if a laminate that is cut in chords fails a rule other than the yield."""
+    """Raise DesignError if a laminate cut in chords fails a rule other than the yield."""
     error = build.curves.chord_error
     try:
         measures = Measures(as_cut(build), build.design)
@@ -363,7 +362,7 @@ def _refusal(error: float, why: str) -> str:
 
 
 def as_cut(build: Build) -> Laminate:
-    """Return the laminate of the parts that a beam along the paths of a build leaves."""
+    """Return the laminate of the parts left by a beam along the paths of a build."""
     parts = {}
     for layer in build.laminate.layers:
         path = build.paths[layer.pattern]

@@ -31,10 +31,10 @@ from sbafab.version import GENERATOR
 
 @dataclass(frozen=True, eq=False)
 class Build:
-    """A design with its laminate and the findings of the rules; what else follows from it is
-    computed when first asked for, and kept.
+    """A design with its laminate and the findings of the rules; derived values are computed on
+    demand and cached.
 
-    ``curves``: how arcs are drawn in its cut files.
+    ``curves`` is the representation of arcs in its cut files.
     """
 
     design: Design
@@ -44,7 +44,7 @@ class Build:
 
     @property
     def failed(self) -> bool:
-        """True if a rule failed that the design does not waive."""
+        """True if a rule failed without a waiver of the design."""
         return has_failed(self.findings)
 
     @property
@@ -54,7 +54,7 @@ class Build:
 
     @property
     def lowered(self) -> tuple[str, ...]:
-        """The limits that the design sets below the usual ones."""
+        """The limits that the design sets below their defaults."""
         return lowered(self.design)
 
     @cached_property
@@ -87,7 +87,7 @@ class Build:
     def schedule(self) -> Schedule:
         """The press schedule; first step and warnings name waived rules and lowered limits.
 
-        Raises DesignError if the press cannot do it.
+        Raises DesignError if the press is unsuitable.
         """
         plain = schedule(self.laminate, self.design, self.cycles.cycles)
         remarks = []
@@ -129,7 +129,7 @@ def refuse_undoable(builds: Sequence[Build]) -> None:
 
 
 def warnings(design: Design) -> dict[Material, str]:
-    """Return the warning that cut files of a film must carry, by material."""
+    """Return the warning required in cut files of a film, by material."""
     return {name: film.warning for name, film in used_films(design).items() if film.warning}
 
 
@@ -153,7 +153,7 @@ def cut_settings(
 
 
 def recipes(design: Design) -> dict[Material, Recipes]:
-    """Return the recipes of each film on the design's machine; films without one are left out."""
+    """Return the recipes of each film on the design's machine; films without one are omitted."""
     laser = design.laser
     by_film = {
         name: recipes_for(laser.recipe or (), film, laser.machine)
@@ -163,9 +163,9 @@ def recipes(design: Design) -> dict[Material, Recipes]:
 
 
 def hole_notes(design: Design, laminate: Laminate) -> tuple[str, ...]:
-    """Return notes for the shop on the base plate's holes, line by line; none without pins.
+    """Return notes for the workshop on the base plate's holes, line by line; none without pins.
 
-    Raises DesignError where no standard pin or plate fits.
+    Raises DesignError if no standard pin or plate fits.
     """
     if not laminate.pins:
         return ()
@@ -185,7 +185,7 @@ def stocks(design: Design) -> dict[Material, Stock]:
 
 
 def _sheets(design: Design) -> dict[Material, tuple[str, Sheet]]:
-    """The sheet of every film, by material, and the table that describes it."""
+    """Return the sheet of every film, by material, and its table in the design."""
     sheets = {"TPE": ("sheets.tpe", design.sheets.tpe), "PTFE": ("sheets.ptfe", design.sheets.ptfe)}
     named_films = design.films.by_name.items()
     return sheets | {

@@ -1,8 +1,8 @@
-"""``sbafab check FOLDER``: an output folder read, and made again from its design to be compared.
+"""``sbafab check FOLDER``: an output folder compared with one regenerated from its design.
 
 Hashes and the manifest are compared, the layers are read and the rules run on them as cut, and
-every other file is compared with its like in a folder made again from ``design.toml``; parts take
-their places on film sheets from ``nest.json``.
+every other file is compared with its counterpart in a folder regenerated from ``design.toml``;
+placements of parts on film sheets come from ``nest.json``.
 """
 
 from __future__ import annotations
@@ -94,8 +94,8 @@ UNMEASURED = (ArithmeticError, ValueError, LookupError, StopIteration)
 
 def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     """Return the findings on an output folder: files, manifest, the rules on the layers as cut, and
-    whether all files are what the design makes; with ``nets``, a file, also whether the layers join
-    what that netlist lists.
+    whether all files match the design; with ``nets``, a file, also whether the layers match that
+    netlist.
 
     In a job's folder all designs are checked, and the film sheets they share. Raises OutputError
     for a folder without a sound manifest or without cut files, and for one inside a job's,
@@ -109,8 +109,8 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
         )
     if isinstance(index, JobManifest) and nets is not None:
         raise DesignError(
-            f"{folder} holds several designs, and a netlist is one design's; check the folder "
-            "of that one"
+            f"{folder} holds several designs, but a netlist belongs to one; check that design's "
+            "folder"
         )
     places = {"": folder}
     if isinstance(index, JobManifest):
@@ -162,7 +162,7 @@ def _findings_of_designs(
 def _of_files(
     problems: Sequence[Finding], sound: str, designs: str, rules: Sequence[Finding] = ()
 ) -> tuple[Finding, ...]:
-    """Return the findings on the files of a folder, those of ``rules`` between them."""
+    """Return the findings on the files of a folder, with those of ``rules`` between them."""
     return (
         *findings_of(INTEGRITY, problems, sound),
         *findings_of(CLAIMS, problems, f"hashes and manifest match the files and the {designs}"),
@@ -177,9 +177,9 @@ def _of_files(
 class AsBuiltFolder(NamedTuple):
     """The folder of a design read back.
 
-    ``build`` is the design with the findings on it, ``expected`` its laminate. ``lost`` are layers
-    that could not be read; ``laminate`` has the layers as cut, None if one is lost. ``problems``
-    are those of the layers and seams.
+    ``build`` is the design with its findings, ``expected`` its laminate. ``lost`` are unreadable
+    layers; ``laminate`` has the layers as cut, None if one is lost. ``problems`` are those of the
+    layers and seams.
     """
 
     claims: Manifest
@@ -197,7 +197,7 @@ class AsBuiltFolder(NamedTuple):
 def read_folder(folder: Path) -> AsBuiltFolder:
     """Read the layers and seams of a design's folder.
 
-    Raises OutputError for a folder without a sound manifest or without cut files, and DesignError
+    Raises OutputError for a folder without a valid manifest or without cut files, and DesignError
     if ``design.toml`` is missing or does not make a laminate.
     """
     claims = read_design_index(folder)
@@ -214,7 +214,7 @@ def read_folder(folder: Path) -> AsBuiltFolder:
         build = make_build(design, curves=curves_of(claims.curves))
         expected = expected_laminate(build)
     except DESIGN_ERRORS as error:
-        raise DesignError(f"design.toml makes no laminate: {error}") from None
+        raise DesignError(f"design.toml does not make a laminate: {error}") from None
     parts, errors = read_layers(folder, build, expected)
     seams, seam_errors = read_seams(folder, expected.seams, build.settings)
     problems = [*errors, *seam_errors]
@@ -253,7 +253,7 @@ def rules_as_cut(built: AsBuiltFolder) -> tuple[Finding, ...]:
 
 
 def _findings_as_cut(rule: Rule, measures: Measures) -> list[Finding]:
-    """Return the findings of a rule; a shape that the rule cannot measure fails it."""
+    """Return the findings of a rule; a shape that the rule cannot measure fails."""
     try:
         return run_rule(rule, measures)
     except UNMEASURED as error:
@@ -269,8 +269,8 @@ def file_problems(
 ) -> list[Finding]:
     """Return files that are missing, changed or not in the manifest.
 
-    A changed file that is ``equal`` to that of the design is a warning, and so is an unlisted one
-    that could not be cut by mistake. Raises OutputError if the folder cannot be read.
+    A changed file that is ``equal`` to the design's is a warning, as is an unlisted one that could
+    not be cut by mistake. Raises OutputError if the folder cannot be read.
     """
     try:
         hashes = file_hashes(folder)
@@ -304,7 +304,7 @@ def file_problems(
 
 
 def _could_be_cut(path: str) -> bool:
-    """Return True if a file, by its folder or suffix, may be taken for a cut file.
+    """Return True if a file's folder or suffix may identify it as a cut file.
 
     Any file among the cut files may: laser programs also open pictures, pages and files without a
     suffix.
@@ -324,7 +324,7 @@ def _links(folder: Path) -> list[str]:
 def _by_hashes(
     folder: Path, claims: Manifest | JobManifest, reasons: Sequence[str]
 ) -> tuple[Finding, ...]:
-    """Compare the files of a folder, whose design cannot be used, with the manifest's hashes."""
+    """Compare the files of a folder with an unusable design with the manifest's hashes."""
     problems = file_problems(folder, claims)
     said = (f"{reason}; only the hashes of the files were compared" for reason in reasons)
     unusable = [problem(DESIGNED, message) for message in said]

@@ -61,7 +61,7 @@ class AdviceEntry(Document):
 
 
 class Checks(Document, schema="sbafab/checks@1"):
-    """The findings, as ``checks.json`` holds them."""
+    """The findings, as in ``checks.json``."""
 
     design: str
     """name of the design or assembly, or the folder's path"""
@@ -83,9 +83,9 @@ def checks(
     designs: Sequence[Design] = (),
     **printed: object,
 ) -> dict[str, Any]:
-    """Return the contents of ``checks.json`` for the design, assembly or folder called ``name``.
+    """Return the contents of ``checks.json`` for the design, assembly or folder ``name``.
 
-    ``source`` is "design" or "as-built", ``designs`` are those that were checked.
+    ``source`` is "design" or "as-built"; ``designs`` are the checked designs.
     """
     return Checks.of(
         None,

@@ -1,6 +1,6 @@
 """Problems of a folder's files, and differences of two files: bytes first, then contents.
 
-Another program or another version of a library may write the same contents in other bytes.
+Another program or library version may write the same contents in different bytes.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def problem(
 
 
 def findings_of(rule: str, problems: Sequence[Finding], passed: str) -> list[Finding]:
-    """Return the findings of a rule: at most MAX_SHOWN problems in full, or one that passes."""
+    """Return the findings of a rule: at most MAX_SHOWN problems in full, or a pass."""
     of_rule = [each for each in problems if each.rule == rule]
     if not any(each.verdict == "fail" for each in of_rule):
         of_rule.append(problem(rule, f"otherwise {passed}" if of_rule else passed, verdict="pass"))
@@ -80,7 +80,7 @@ def findings_of(rule: str, problems: Sequence[Finding], passed: str) -> list[Fin
 
 
 def reason_of(error: Exception, file: str) -> str:
-    """Return what an error says of a file, without the file's name."""
+    """Return an error's message about a file, without the file's name."""
     return str(error).removeprefix(f"{PurePosixPath(file).name}: ")
 
 
@@ -97,7 +97,7 @@ def sound_digest(path: Path) -> str:
     marks = sum(1 for _ in MARK.finditer(data)) if is_long else 0
     if marks > MAX_ENTITIES:
         raise OutputError(
-            f"drawn with {marks:,} entities and points, where at most {MAX_ENTITIES:,} may be"
+            f"drawn with {marks:,} entities and points; the limit is {MAX_ENTITIES:,}"
         )
     return hashlib.sha256(data).hexdigest()
 
@@ -115,7 +115,7 @@ SAVED_ANEW = {
 
 def is_saved_anew(actual: Path, expected: Path) -> bool:
     """Return True if a file without a ``file_difference`` is a cut file or mesh that another
-    program may save: it has the expected one's contours and strokes, in their order.
+    program may save: its contours and strokes match the expected ones in order.
     """
     if actual.parent.name not in (*CUT_FOLDERS, "mesh") or actual.suffix not in SAVED_ANEW:
         return False
@@ -133,7 +133,7 @@ def _ends(drawing: ReadBack) -> list[Point]:
 
 
 def saved_anew(layer_of: Mapping[str, int | None]) -> list[Finding]:
-    """Return warnings of files saved anew, one for each kind; ``layer_of`` gives their layers."""
+    """Warnings about files saved again, one for each kind; ``layer_of`` gives their layers."""
     problems = []
     kinds: dict[str, list[str]] = {}
     for path in layer_of:
@@ -147,9 +147,9 @@ def saved_anew(layer_of: Mapping[str, int | None]) -> list[Finding]:
 
 
 def file_difference(actual: Path, expected: Path, name: str) -> str:
-    """Return the difference of a file from the expected one in a sentence; "" if none.
+    """Return the difference of a file from the expected one as a sentence; "" if there is none.
 
-    ``name``: the file's name in the sentence.
+    ``name`` is the file's name in the sentence.
     """
     compare = _readers().get(expected.suffix)
     if expected.name.endswith(PROGRAMS["rdworks"].ending):
@@ -162,13 +162,13 @@ def file_difference(actual: Path, expected: Path, name: str) -> str:
 
 
 def has_lost_properties(path: Path) -> bool:
-    """Return True for a sheet or plate without custom properties: other programs drop them."""
+    """Return True for a sheet or plate without custom properties, which other programs drop."""
     return _is_cut(path) and not read_profile(path).properties
 
 
 def unreadable(path: Path) -> str:
-    """Return why a layer, sheet or plate is not sound: its file, units, contours or cutting order;
-    "" if it is, and for other files.
+    """Return why a layer, sheet or plate is invalid: its file, units, contours or cutting order; ""
+    if it is valid, and for other files.
     """
     if not _is_cut(path):
         return ""
@@ -207,7 +207,7 @@ def _text(path: Path) -> str:
 
 
 def _members(path: Path) -> dict[str, str]:
-    """Return the texts in an archive by name: compression depends on the library."""
+    """Return the texts in an archive by name, since compression depends on the library."""
     with ZipFile(path) as archive:
         if sum(info.file_size for info in archive.infolist()) > MAX_MESH_BYTES:
             raise OutputError(f"holds more than {MAX_MESH_BYTES:,} bytes")
@@ -215,13 +215,13 @@ def _members(path: Path) -> dict[str, str]:
 
 
 def _table(text: str) -> dict[str, Any]:
-    """Return the rows of a CSV table by column, counted from 1 below the names of the columns."""
+    """Return the rows of a CSV table by column; rows count from 1 below the column names."""
     names, *rows = [*csv.reader(text.splitlines(True))] or [[]]
     return {"columns": names, "row": [dict(zip_longest(names, row)) for row in rows]}
 
 
 def value_difference(actual: Any, expected: Any, where: str = "") -> str:
-    """Return the first difference of two values of JSON, with its dotted place; "" if none."""
+    """The first difference of two JSON values, with its dotted place; "" if there is none."""
     if isinstance(expected, dict) and isinstance(actual, dict):
         for key in expected | actual:
             if key not in actual or key not in expected:
@@ -261,7 +261,7 @@ def _shown(value: object) -> str:
 
 
 def _text_difference(*paths: Path) -> str:
-    """Return the first difference of two texts of XML or HTML, in which comments do not count."""
+    """Return the first difference of two XML or HTML texts, ignoring comments."""
     actual, expected = map(_markup, paths)
     pictures = [[*map(base64.b64decode, PICTURE.findall(text))] for text in (actual, expected)]
     if len(pictures[0]) != len(pictures[1]):
@@ -282,7 +282,7 @@ def _markup(path: Path) -> str:
 
 
 def _words_difference(actual: str, expected: str) -> str:
-    """Return the first different word or number; line breaks do not count."""
+    """Return the first different word or number, ignoring line breaks."""
     words, expected_words = [*_tokens(actual)], [*_tokens(expected)]
     for word, expected_word in zip(words, expected_words, strict=False):
         if word != expected_word and not (
@@ -326,7 +326,7 @@ def _picture_difference(actual: bytes, expected: bytes) -> str:
 
 
 def _drawing_difference(actual: Path, expected: Path) -> str:
-    """Return a difference of contours, strokes or properties of two drawings; "" if none."""
+    """A difference of contours, strokes or properties of two drawings; "" if there is none."""
     drawing, designed = read_profile(actual), read_profile(expected)
     try:
         check_contours(drawing.region, designed.region, TOLERANCE)
@@ -378,7 +378,7 @@ MeshBody = tuple[Surface, str]
 
 
 def mesh_difference(actual: Path, expected: Path) -> str:
-    """Return a difference of two mesh files of one format; "" if they hold the same bodies.
+    """Return a difference of two mesh files of one format; "" if their bodies are equal.
 
     Points, enclosed volume, area and watertightness are compared; triangles may differ.
     """
@@ -389,7 +389,7 @@ def mesh_difference(actual: Path, expected: Path) -> str:
 
 
 def bodies(path: Path) -> list[MeshBody]:
-    """Read the bodies of an STL or GLB file, mm or m. Raises OutputError for an unsound file."""
+    """Read the bodies of an STL or GLB file, mm or m. Raises OutputError for an invalid file."""
     if path.stat().st_size > MAX_MESH_BYTES:
         raise OutputError(f"larger than {MAX_MESH_BYTES:,} bytes")
     # Only a mesh that differs is read.

@@ -1,6 +1,6 @@
-"""``manifest.json``: its records, each read from what it describes, and the hashes of files.
+"""``manifest.json``: its records, each built from its subject, and the hashes of files.
 
-A key with a default may be missing in a folder that is read.
+A folder that is read may lack a key with a default.
 """
 
 from __future__ import annotations
@@ -90,8 +90,8 @@ class InterfaceClaim(_Claim):
 
 
 class SeamClaim(_Claim):
-    """A seam and the file of its path; ``order`` is that in which the seams are listed, ``step``
-    the number of its step in ``press.json``.
+    """A seam and the file of its path. ``order`` is its number in the list of seams, ``step`` the
+    number of its step in ``press.json``.
     """
 
     name: str
@@ -257,7 +257,7 @@ class DesignClaim(_Claim):
 
 
 class JobManifest(_Claim, schema=JOB_SCHEMA):
-    """``manifest.json`` of several designs cut together."""
+    """``manifest.json`` of several designs that are cut together."""
 
     name: str
     units: Literal["mm"]
@@ -472,7 +472,7 @@ def identity(build: Build) -> dict[str, Any]:
 
 
 def carried_over(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """True if files of the old run belong to the new one's design and version."""
+    """Return True if files of the old run belong to the new run's design and version."""
     return all(old.get(key) == new.get(key) for key in ("design_sha256", "generator", "waived"))
 
 
@@ -488,19 +488,19 @@ def is_job(folder: Path) -> bool:
 
 
 def read_design_index(folder: Path) -> Manifest:
-    """Return the manifest of a design's folder. Raises OutputError as ``read_index`` does."""
+    """Return the manifest of a design's folder. Raises OutputError like ``read_index``."""
     index = read_index(folder)
     if isinstance(index, Manifest):
         return index
-    raise OutputError(f"{folder} is not the folder of one design; regenerate the folder above it")
+    raise OutputError(f"{folder} is not the folder of one design; regenerate its parent folder")
 
 
 def read_index(folder: Path) -> Manifest | JobManifest:
-    """Return the manifest of an output folder. Raises OutputError if it is missing or unsound."""
+    """Return the manifest of an output folder. Raises OutputError if it is missing or invalid."""
     path = folder / MANIFEST
     if not os.path.lexists(path):
         raise OutputError(
-            f"{folder} holds no manifest.json; give a folder that sbafab generate has written"
+            f"{folder} has no manifest.json; give a folder written by sbafab generate"
         )
     try:
         data = sound_bytes(path, MAX_MANIFEST_BYTES)
@@ -516,6 +516,6 @@ def read_index(folder: Path) -> Manifest | JobManifest:
         where = "".join(f"{part}." for part in first["loc"])
         fault = f"{where[:-1]}: {first['msg'][:1].lower()}{first['msg'][1:]}"
     raise OutputError(
-        f"{path} is not a sound {schema or SCHEMA}: {fault}; regenerate the folder with sbafab "
+        f"{path} is not a valid {schema or SCHEMA}: {fault}; regenerate the folder with sbafab "
         "generate"
     )

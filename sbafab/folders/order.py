@@ -39,11 +39,11 @@ MOST_BYTES = 50_000_000
 
 @dataclass(frozen=True, eq=False)
 class Order:
-    """Builds made together into one folder: those of a design, of several, or of the parts of
-    an assembly.
+    """Builds made together into one folder: those of a design, of several, or of an assembly's
+    parts.
 
-    ``schema`` identifies the folder's manifest. ``between``: the findings between the parts of an
-    assembly, None for designs.
+    ``schema`` identifies the folder's manifest. ``between`` holds the findings between the parts of
+    an assembly, None for designs.
     """
 
     schema: Schema
@@ -54,7 +54,7 @@ class Order:
 
     @property
     def findings(self) -> tuple[Finding, ...]:
-        """The findings of the designs, of several each with its name; then those between parts."""
+        """The findings of the designs, with names if there are several, and between parts."""
         if len(self.builds) == 1 and self.between is None:
             return self.builds[0].findings
         named = (
@@ -72,7 +72,7 @@ class Order:
 
     @property
     def notes(self) -> list[str]:
-        """The notes of all designs once each, after the names of theirs if not of all."""
+        """The notes of all designs, each once, with design names unless common to all."""
         designs: dict[str, list[str]] = {}
         for build in self.builds:
             for note in dict.fromkeys(build.laminate.notes):
@@ -89,7 +89,7 @@ class Order:
 
     @property
     def failed(self) -> bool:
-        """True if a rule or a check between parts failed that is not waived."""
+        """True if a rule or a check between parts failed without a waiver."""
         return has_failed(self.findings)
 
     @property
@@ -100,13 +100,13 @@ class Order:
 
     @property
     def lowered(self) -> tuple[str, ...]:
-        """The limits of the checks between parts that the assembly weakens."""
+        """The limits of the checks between parts that the assembly relaxes."""
         return () if self.assembled is None else lowered_checks(self.assembled.assembly.rules)
 
     @cached_property
     def settings(self) -> CutSettings:
-        """The settings of the film sheets: of several designs one hash over all, and the waivers
-        and lowered limits of all.
+        """The settings of the film sheets; for several designs, one hash and the waivers and
+        lowered limits of all.
         """
         each = [build.settings for build in self.builds]
         if self.schema == SCHEMA:
@@ -126,8 +126,8 @@ class Order:
     def nests(self, old_folder: Path, progress: Progress) -> tuple[Nest, ...]:
         """Return places for all pieces on the film sheets of the first design.
 
-        Places of an earlier run in ``old_folder`` for the same pieces and sheets are taken over.
-        Raises DesignError if pieces do not fit.
+        Places of an earlier run in ``old_folder`` for the same pieces and sheets are reused. Raises
+        DesignError if pieces do not fit.
         """
         progress("nesting", 0, 1)
         pieces = [piece for build in self.builds for piece in build.pieces]
@@ -143,8 +143,8 @@ def make_order(
 ) -> Order:
     """Check a design, an assembly with the space between its parts, or the designs of job ``name``.
 
-    Raises DesignError if one cannot be built, or if the film sheets, kerf or machine of several are
-    not equal.
+    Raises DesignError if one cannot be built, or if designs have different film sheets, kerf or
+    machine.
     """
     if isinstance(source, Design):
         return Order(SCHEMA, source.name, (make_build(source, progress, curves),))
@@ -178,14 +178,14 @@ def of_assembly(assembled: Assembled, builds: Sequence[Build]) -> Order:
 
 
 def refuse_other_film(designs: Sequence[Design]) -> None:
-    """Raises DesignError where two designs are not cut from the same film by one machine."""
+    """Raise DesignError if two designs are not cut from the same film by one machine."""
     first, *rest = designs
     for design in rest:
         for section in SHARED:
             if getattr(design, section) != getattr(first, section):
                 raise DesignError(
-                    f"{section} differs between {first.name} and {design.name}, which are to be "
-                    f"cut from the same film; make the section {section} equal in both"
+                    f"{section} differs between {first.name} and {design.name}, which share a "
+                    f"film; make the section {section} equal in both"
                 )
 
 
@@ -208,11 +208,13 @@ def _refuse_names(names: Sequence[str], name: str) -> None:
     reserved = next((design for design in names if design.lower() in RESERVED), None)
     if reserved is not None:
         raise DesignError(
-            f"a design is named {reserved}, as {RESERVED[reserved.lower()]} is; give it another "
-            "name in its design file"
+            f"a design is named {reserved}, like {RESERVED[reserved.lower()]}; rename it in its "
+            "design file"
         )
     if name.lower() in (*folders, *RESERVED):
-        raise DesignError(f"the job is named {name} as one of its folders; choose another --name")
+        raise DesignError(
+            f"the job and one of its folders are both named {name}; choose another --name"
+        )
 
 
 # Places of pieces on film sheets.
@@ -233,7 +235,7 @@ def _nested(parts: Sequence[NestPart], design: Design) -> tuple[Nest, ...]:
 
 
 def _saved(parts: Sequence[NestPart], design: Design, path: Path) -> tuple[Nest, ...] | None:
-    """Return the places of an earlier run; None if none are sound and for these parts."""
+    """Return the places of an earlier run; None if none are valid for these parts."""
     try:
         if not path.is_file() or path.stat().st_size > MOST_BYTES:
             return None

@@ -1,7 +1,8 @@
-"""One run: a request becomes a folder, written beside the old one, verified, and swapped in whole.
+"""One run: a request becomes a folder, which is written beside the old one, verified, and swapped
+in as a whole.
 
-Request -> order of builds -> artefacts -> folder. Command line, Python
-interface and studio all come through ``generate``.
+Request -> order of builds -> artefacts -> folder. Command line, Python interface and studio all use
+``generate``.
 """
 
 from __future__ import annotations
@@ -68,11 +69,11 @@ if TYPE_CHECKING:
 class RunRequest:
     """A folder to be written: ``out/<name>/`` of a design, an assembly or several designs.
 
-    ``name`` is for several designs, a design or assembly has its own; ``parts`` and what follows
-    are for a design. Volume and shell ``meshes`` in the ``formats`` of these file endings, which
-    take the extra "mesh", come with the part "mesh", ``prediction`` with "predict"; of a part named
-    after a simulator, ``simulated`` is the folder in which it has run, without it what the
-    simulator reads is written.
+    ``name`` is for several designs; a design or assembly has its own. ``parts`` and the following
+    fields are for one design. Volume and shell ``meshes``, in the ``formats`` of these file
+    suffixes, need the extra "mesh" and the part "mesh"; ``prediction`` needs "predict". For a part
+    named after a simulator, ``simulated`` is the folder of its finished run; without it only the
+    simulator's input is written.
     """
 
     source: Design | Assembly | Sequence[Design]
@@ -88,10 +89,10 @@ class RunRequest:
 
 @dataclass(frozen=True, repr=False)
 class Run:
-    """The outcome of a run on one design or several; nothing to cut if it ``failed``.
+    """The outcome of a run on one design or several; there are no cut files if it ``failed``.
 
-    ``manifest`` is empty if nothing was written. ``conforming``: volume and shell meshes, if they
-    were asked for.
+    ``manifest`` is empty if nothing was written. ``conforming`` holds requested volume and shell
+    meshes.
     """
 
     order: Order
@@ -109,7 +110,7 @@ class Run:
 
     @property
     def builds(self) -> tuple[Build, ...]:
-        """The designs with the findings in each."""
+        """The designs with their findings."""
         return self.order.builds
 
     @property
@@ -119,28 +120,28 @@ class Run:
 
     @property
     def design(self) -> Design:
-        """The design, the first one of several."""
+        """The design, or the first of several."""
         return self.builds[0].design
 
     @property
     def laminate(self) -> Laminate:
-        """The laminate, of several designs the first one's."""
+        """The laminate of the first design."""
         return self.builds[0].laminate
 
     @property
     def schedule(self) -> Schedule | None:
-        """The press schedule, of the first design of several; None if none was written."""
+        """The press schedule of the first design; None if none was written."""
         is_written = any(path.endswith("press.json") for path in self.manifest.get("files", ()))
         return self.builds[0].schedule if is_written else None
 
     @property
     def findings(self) -> Findings:
-        """The findings of the rules; of several designs, each with its design's name."""
+        """The findings of the rules; for several designs, each with its design's name."""
         return Findings(self.order.findings)
 
     @property
     def failed(self) -> bool:
-        """True if a rule failed that the design does not waive; no cut file was written then."""
+        """True if a rule failed without a waiver of the design; no cut file was written then."""
         return self.order.failed
 
     def __repr__(self) -> str:
@@ -157,12 +158,12 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
     """Write the folder of a request and return the outcome.
 
     A design that breaks a rule gets its findings and pictures, but no cut files, schedule or
-    meshes; a folder that holds another design's is then left untouched (``Run.kept``). A prediction
-    alone goes into a folder beside such a one (``Run.beside``). Of several designs nothing is
-    written if one fails. With some of the ``parts`` only, the others stay if
-    they are of the same design. Raises DesignError or OutputError, also where other parts are
-    another design's, and DefectError where a cut file was changed after it had been read back; the
-    old folder is then whole.
+    meshes; a folder that holds another design's cut files is then left untouched (``Run.kept``). A
+    prediction alone goes into a folder beside it (``Run.beside``). If one of several designs fails,
+    nothing is written. If only some of the ``parts`` are written, the others stay if they are of
+    the same design. Raises DesignError, OutputError (also if other parts belong to another design)
+    or DefectError if a cut file was changed after it had been read back; the old folder is then
+    unchanged.
     """
     progress = progress or ignore_progress
     order = make_order(request.source, request.name, progress, request.curves)
@@ -193,10 +194,10 @@ def generate(request: RunRequest, progress: Progress | None = None) -> Run:
 
 
 def _parts_to_write(request: RunRequest, order: Order, target: Path) -> set[RunPart] | None:
-    """Return the parts to be written, of an order that failed only pictures; None to leave all as
-    is.
+    """Return the parts to write; of an order that failed, only pictures; None to leave everything
+    unchanged.
 
-    Raises OutputError if some parts alone would take the place of another design's files.
+    Raises OutputError if some parts alone would replace another design's files.
     """
     parts = set(request.parts) if order.schema == SCHEMA else set(EVERYTHING)
     build = order.builds[0]
@@ -211,8 +212,8 @@ def _parts_to_write(request: RunRequest, order: Order, target: Path) -> set[RunP
 
 
 def refuse_unmakable(order: Order, parts: Collection[RunPart]) -> None:
-    """Raises DesignError, before anything is written, if press, kerf or chords cannot do the builds
-    of an order.
+    """Raise DesignError, before anything is written, if press, kerf or chords are unsuitable for an
+    order.
     """
     for build in order.builds:
         if {"press", "predict"} & set(parts):
@@ -225,7 +226,7 @@ def refuse_unmakable(order: Order, parts: Collection[RunPart]) -> None:
 def _extras(
     request: RunRequest, build: Build, parts: Collection[RunPart], progress: Progress
 ) -> dict[str, Any]:
-    """Return what a run on one design writes beside what follows from the design."""
+    """Return what a run on one design writes in addition to files derived from the design."""
     extras = {"prediction": request.prediction, "simulated": request.simulated}
     if request.meshes is None or "mesh" not in parts:
         return extras
@@ -240,10 +241,10 @@ def _extras(
 
 @dataclass(frozen=True)
 class Simulated:
-    """The outcome of a simulation; no result and no folder where a rule ``failed`` before.
+    """The outcome of a simulation; no result and no folder if a rule ``failed`` before.
 
-    An export has no result. ``beside`` is one sentence if ``folder`` is not in the design's own,
-    which could not be written at the end.
+    An export has no result. ``beside`` is one sentence if ``folder`` is not in the design's own
+    folder, which could not be written at the end.
     """
 
     findings: Sequence[Finding]
@@ -253,7 +254,7 @@ class Simulated:
 
     @property
     def failed(self) -> bool:
-        """True if a rule failed that the design does not waive; no simulator ran then."""
+        """True if a rule failed without a waiver of the design; no simulator ran then."""
         return self.folder is None
 
 
@@ -335,7 +336,7 @@ WHOLE = {"layers", "sheets", "preview", "predict"}
 def would_replace(
     target: Path, mine: Mapping[str, Any] | None, replaced: Collection[str] = ()
 ) -> list[str]:
-    """Return files worth keeping of another design's run in ``target`` that a new run would lose.
+    """Return files worth keeping of another design's run in ``target`` that a new run would delete.
 
     ``mine`` identifies the new run's design and version as its manifest does; ``replaced`` are the
     files and folders that it writes itself.
@@ -349,23 +350,23 @@ def would_replace(
 
 
 def refuse_to_replace(target: Path, build: Build, replaced: Collection[str]) -> None:
-    """Raises OccupiedError where a run that writes ``replaced`` would lose others' files."""
+    """Raise OccupiedError if a run that writes ``replaced`` would delete others' files."""
     mine = identity(build)
     lost = would_replace(target, mine, replaced)
     if lost:
         names = dict.fromkeys(path.partition("/")[0] for path in lost)
         raise OccupiedError(
             f"{target} holds {', '.join(names)} of another design or version (sbafab compare "
-            f"shows what differs); take {target / 'design.toml'} for the design that was run "
-            "there, or give this one a folder of its own with --set name=NAME or -o"
+            f"shows what differs); use {target / 'design.toml'} for the design of that run, or "
+            "choose another folder with --set name=NAME or -o"
         )
 
 
 def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     """Copy files of the old run that this one did not write, if they are of the same design.
 
-    ``index`` is the new manifest, completed by their entries. Raises OutputError where results of a
-    simulator would be lost to input of other settings.
+    ``index`` is the new manifest, to which their entries are added. Raises OutputError if results
+    of a simulator would be lost to input with other settings.
     """
     old = read_manifest(old_folder)
     if old is None or not carried_over(old, index):
@@ -377,8 +378,8 @@ def carry_over(old_folder: Path, folder: Path, index: dict[str, Any]) -> None:
     for name in anew:
         if f"{name}/{RESULTS}" in existing and f"{name}/{RESULTS}" not in written:
             raise OutputError(
-                f"{old_folder / name} holds results of other settings than these; choose another "
-                "folder with -o, or remove that one"
+                f"{old_folder / name} holds results of other settings; choose another folder "
+                "with -o, or remove it"
             )
     old_meshes = old.get("mesh_statistics")
     if "mesh_statistics" in index and old_meshes not in (None, index["mesh_statistics"]):
@@ -410,7 +411,7 @@ def _differs(path: str, old_folder: Path, folder: Path) -> bool:
 
 
 def _are_files(entries: object, carried: set[str]) -> bool:
-    """True if manifest entries name files that were all carried over."""
+    """Return True if manifest entries name files that were all carried over."""
     return (
         isinstance(entries, list)
         and bool(entries)

@@ -1,4 +1,4 @@
-"""Writing a folder beside the old one and swapping it in whole."""
+"""Write a folder beside the old one and swap it in as a whole."""
 
 from __future__ import annotations
 
@@ -39,11 +39,11 @@ LONGEST_SHOWN = 120
 
 @contextlib.contextmanager
 def replaced_folder(target: Path) -> Iterator[Path]:
-    """Yields an empty folder beside ``target`` that takes its place when the block ends well.
+    """Yield an empty folder beside ``target`` that replaces it if the block succeeds.
 
-    Whatever happens, ``target`` is the old folder or the new one, whole; files that others have
-    put there stay. Raises OutputError where the place cannot be written, holds something that is
-    not an output of this program, or somebody's file among the cut files.
+    In any case ``target`` is the complete old folder or the complete new one; files that others
+    have put there stay. Raises OutputError if the place cannot be written, holds something other
+    than output of this program, or foreign files among the cut files.
     """
     try:
         with _locked(target):
@@ -66,7 +66,7 @@ def replaced_folder(target: Path) -> Iterator[Path]:
 
 
 def refuse_busy(target: Path) -> None:
-    """Raises OutputError where ``replaced_folder`` could not write now; creates nothing."""
+    """Raise OutputError if ``replaced_folder`` could not write now; creates nothing."""
     refuse_file_as_folder(target.parent)
     _refuse_foreign(target)
     if _lock_file(target).exists():
@@ -80,7 +80,7 @@ def _lock_file(target: Path) -> Path:
 
 @contextlib.contextmanager
 def _locked(target: Path) -> Iterator[None]:
-    """Holds the lock of a folder that may be written. Raises OutputError or OSError."""
+    """Hold the lock of a folder that may be written. Raises OutputError or OSError."""
     refuse_file_as_folder(target.parent)
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -113,7 +113,7 @@ def _unwritten(target: Path, reason: str) -> OutputError:
 
 
 def _tidy_up(target: Path) -> None:
-    """Removes what a killed run left, and puts a folder back that it had only moved aside."""
+    """Remove leftovers of a killed run, and restore a folder that it had only moved aside."""
     # Eight characters, as mkdtemp makes them: a longer match belongs to another design's run.
     begun = f".{target.name}.{'?' * 8}"
     for aside in sorted(target.parent.glob(f"{begun}{ASIDE}")):
@@ -128,8 +128,8 @@ def _refuse_foreign(target: Path) -> None:
     around = read_manifest(target.parent)
     if around is not None and around["schema"] != SCHEMA:
         raise OutputError(
-            f"{target.parent} holds several designs made together, and its manifest lists all that "
-            f"lies in it; choose another folder with -o than for {target.name} in there"
+            f"{target.parent} holds several designs made together, all listed in its manifest; "
+            f"choose a folder outside it for {target.name} with -o"
         )
     if target.is_symlink():
         raise OutputError(f"{target} is a link; remove it or choose another folder with -o")
@@ -146,13 +146,13 @@ def _refuse_foreign(target: Path) -> None:
     among = next((p for p in _foreign_files(target) if is_among_cut_files(p)), None)
     if among is not None:
         raise OutputError(
-            f"{target / among} was not written by sbafab and lies among the cut files; move it "
+            f"{target / among} was not written by sbafab but lies among the cut files; move it "
             "away, or choose another folder with -o"
         )
 
 
 def _foreign_files(target: Path) -> list[Path]:
-    """Files of a run's folder, relative to it, that the run did not write."""
+    """Return files of a run's folder, relative to it, that the run did not write."""
     listed = listed_files(target)
     if not listed:
         return []
@@ -166,31 +166,31 @@ def _foreign_files(target: Path) -> list[Path]:
 
 
 def is_among_cut_files(path: PurePath) -> bool:
-    """Return whether a file, given relative to a run's folder, lies where the laser's files do."""
+    """Return True if a file, given relative to a run's folder, lies among the laser's files."""
     return bool({*path.parts} & {*CUT_FOLDERS}) and path.name not in SYSTEM_FILES
 
 
 def listed_files(folder: Path) -> list[str]:
-    """The files that the manifest of a folder names, none if there is none."""
+    """Return the files in the manifest of a folder; none without a manifest."""
     files = (read_manifest(folder) or {}).get("files")
     return list(files) if isinstance(files, dict) else []
 
 
 def _keep(old: Path, new: Path) -> None:
-    """Takes somebody's file over into the new folder, unless the run wrote one of that name."""
+    """Move a foreign file to the new folder, unless the run wrote a file of that name."""
     if not os.path.lexists(new):
         new.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(old, new, follow_symlinks=False)
 
 
 def sound_bytes(path: Path, most: int) -> bytes:
-    """Return a file's contents. Raises OutputError, without the file's name, if it is missing, no
-    plain file, unreadable, or of more bytes than ``most``.
+    """Return a file's contents. Raises OutputError, without the file's name, if it is missing, not
+    a regular file, unreadable, or larger than ``most`` bytes.
     """
     try:
         # Reading a pipe or a device would never end.
         if path.exists() and not path.is_file():
-            raise OutputError("not a plain file; regenerate it")
+            raise OutputError("not a regular file; regenerate it")
         if path.stat().st_size > most:
             raise OutputError(f"larger than {most:,} bytes; regenerate it")
         return path.read_bytes()
@@ -203,7 +203,7 @@ def sound_bytes(path: Path, most: int) -> bytes:
 
 
 def read_manifest(folder: Path) -> dict[str, Any] | None:
-    """The manifest of an output folder, or None if there is none."""
+    """Return the manifest of an output folder, or None if there is none."""
     try:
         manifest = json.loads(sound_bytes(folder / MANIFEST, MAX_MANIFEST_BYTES))
     except (OutputError, ValueError, RecursionError):
@@ -213,7 +213,7 @@ def read_manifest(folder: Path) -> dict[str, Any] | None:
 
 
 def _put_in_place(fresh: Path, target: Path) -> None:
-    """Puts ``fresh`` in the place of ``target``; the old folder ends up where ``fresh`` was."""
+    """Put ``fresh`` in the place of ``target``; the old folder ends up at ``fresh``."""
     if not target.exists():
         fresh.rename(target)
         return
@@ -231,7 +231,7 @@ def _put_in_place(fresh: Path, target: Path) -> None:
 
 
 def _exchange(a: Path, b: Path) -> bool:
-    """Exchanges two names in one step (Linux renameat2); False where that is not to be had."""
+    """Exchange two names in one step (Linux renameat2); False if unavailable."""
     if not sys.platform.startswith("linux"):
         return False
     at_cwd, exchange = -100, 2

@@ -1,6 +1,6 @@
-"""Smooth curves fitted by circular arcs: biarcs, two arcs that share a tangent where they join.
+"""Smooth curves fitted by biarcs: two circular arcs with a common tangent where they join.
 
-A curve is a function of a parameter that gives the point and the derivative there.
+A curve is a function that maps a parameter to a point and the derivative there.
 """
 
 from __future__ import annotations
@@ -37,11 +37,11 @@ LARGEST_TURN = math.radians(80)
 
 
 class FitError(ArithmeticError):
-    """A curve that arcs cannot follow; the message names the place."""
+    """A curve that cannot be fitted by arcs; the message gives the location."""
 
 
 def bezier(controls: Sequence[Point]) -> Curve:
-    """The Bézier curve of three or four control points, parameter 0 to 1."""
+    """Return the Bézier curve of three or four control points, for parameters 0 to 1."""
 
     def between(a: Point, b: Point, t: float) -> Point:
         return a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
@@ -57,7 +57,7 @@ def bezier(controls: Sequence[Point]) -> Curve:
 
 
 def ellipse(centre: Point, major: Point, minor: Point) -> Curve:
-    """Centre + major cos t + minor sin t: the half axes are vectors (conjugate ones will do)."""
+    """The ellipse centre + major cos t + minor sin t, from half axes (or conjugate vectors)."""
 
     def curve(t: float) -> tuple[Point, Point]:
         c, s = math.cos(t), math.sin(t)
@@ -72,7 +72,7 @@ def ellipse(centre: Point, major: Point, minor: Point) -> Curve:
 def elliptical_arc(
     centre: Point, major: Point, minor: Point, first: float, last: float
 ) -> tuple[Edge, ...]:
-    """Edges along centre + major cos t + minor sin t; exact if the half axes are a circle's."""
+    """Return edges along centre + major cos t + minor sin t; exact for a circle."""
     if last < first:
         forward = elliptical_arc(centre, major, minor, last, first)
         return tuple(edge.reversed() for edge in reversed(forward))
@@ -90,9 +90,10 @@ def elliptical_arc(
 def fit_arcs(
     curve: Curve, first: float, last: float, tolerance: float = TOLERANCE
 ) -> tuple[Edge, ...]:
-    """Arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to ``last``.
+    """Return arcs and lines within ``tolerance`` mm of the curve from parameter ``first`` to
+    ``last``.
 
-    Neighbours share a tangent, and each biarc reaches as far as the tolerance allows. Raises
+    Neighbours share a tangent, and each biarc extends as far as the tolerance allows. Raises
     FitError if the curve has a cusp, or is far too long or rugged.
     """
     edges: list[Edge] = []
@@ -108,14 +109,14 @@ def fit_arcs(
         at, step = reach, reach - at
         if len(edges) > MOST_ARCS:
             (x, y), _ = curve(at)
-            raise FitError(f"curve that {MOST_ARCS} arcs do not follow past x {x:.4f}, y {y:.4f}")
+            raise FitError(f"curve that {MOST_ARCS} arcs cannot follow beyond x {x:.4f}, y {y:.4f}")
     return tuple(edge for edge in edges if edge.length > EPSILON)
 
 
 def _longest_span(
     curve: Curve, at: float, last: float, step: float, tolerance: float
 ) -> tuple[float, list[Edge]]:
-    """The farthest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
+    """The largest parameter that one biarc from ``at`` reaches, by doubling, then bisection."""
     good, bad, end = at, math.inf, min(last, at + step)
     fitted: list[Edge] = []
     for _ in range(MOST_TRIALS):
@@ -132,7 +133,7 @@ def _longest_span(
 
 
 def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Edge]:
-    """Two edges tangent to the curve at both parameters; empty if they stray from it between."""
+    """Two edges tangent to the curve at both parameters; empty if they deviate too far between."""
     start, u = curve(first)[0], _unit_tangent(curve, first, last)
     end, v = curve(last)[0], _unit_tangent(curve, last, first)
     edges = biarc(start, u, end, v)
@@ -146,9 +147,9 @@ def _biarc(curve: Curve, first: float, last: float, tolerance: float) -> list[Ed
 
 
 def biarc(start: Point, u: Point, end: Point, v: Point, straight: float = STRAIGHT) -> list[Edge]:
-    """Two edges from start along ``u`` to end along ``v``; empty if these turn too far apart.
+    """Return two edges from start along ``u`` to end along ``v``; empty if the turn is too large.
 
-    An arc that bulges less than ``straight`` mm is a line, which leaves a kink where they join.
+    An arc with a height below ``straight`` mm becomes a line, which leaves a kink at its ends.
     """
     # One tangent length d on both sides: |end - start - d (u + v)| = 2 d, solved so that it
     # keeps its digits where the tangents are parallel.
@@ -191,7 +192,7 @@ def edge_through(start: Point, middle: Point, end: Point) -> Edge:
 
 
 def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
-    """Unit derivative at a parameter, or just beside it where it vanishes."""
+    """Return the unit derivative at a parameter, or just beside it if it vanishes."""
     for nudge in (0.0, 1e-6, 1e-4):
         dx, dy = curve(at + nudge * (towards - at))[1]
         size = math.hypot(dx, dy)
@@ -202,5 +203,5 @@ def _unit_tangent(curve: Curve, at: float, towards: float) -> Point:
 
 
 def _angle(u: Point, v: Point) -> float:
-    """Angle that turns u into v, counter-clockwise positive."""
+    """Return the angle from u to v, counter-clockwise positive."""
     return math.atan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1])

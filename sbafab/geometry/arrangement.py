@@ -1,4 +1,4 @@
-"""Edges cut where they meet, and the winding numbers on both sides of each piece."""
+"""Edges cut at their intersections, and the winding numbers on both sides of each piece."""
 
 from __future__ import annotations
 
@@ -77,8 +77,10 @@ ROUNDS = 4
 
 
 class Piece(NamedTuple):
-    """An edge that meets others at its ends only, with the winding number on its left minus the one
-    on its right. ``by_owner`` separates the digits of several owners.
+    """An edge that meets others only at its ends, with the winding number on its left minus that on
+    its right.
+
+    ``by_owner`` separates the digits of several owners.
     """
 
     edge: Edge
@@ -90,7 +92,7 @@ Overlay = tuple[list[Piece], bool]
 
 
 def overlaid(owners: Sequence[Iterable[Edge]], tolerance: float = EPSILON) -> Overlay:
-    """Return the edges of all owners without duplicates, cut where they meet.
+    """Return the edges of all owners without duplicates, cut at their intersections.
 
     An edge that was bent to meet another is cut again, because it may now meet a third.
     """
@@ -103,9 +105,9 @@ def overlay(
     tolerance: float = EPSILON,
     chain: Sequence[int] | None = None,
 ) -> Overlay:
-    """Return edges, each with its number of turns, without duplicates, cut where they meet.
+    """Return edges, each with its number of turns, without duplicates, cut at their intersections.
 
-    ``chain`` holds, for each edge, the number of its closed chain if that stays clear of itself,
+    ``chain`` holds, for each edge, the number of its closed chain if that does not meet itself,
     otherwise a negative number.
     """
     bent = True
@@ -134,10 +136,10 @@ Split = tuple[list[list[Edge]], bool]
 def split_edges(
     edges: Sequence[Edge], tolerance: float = EPSILON, chain: Sequence[int] | None = None
 ) -> Split:
-    """Return each edge cut where it meets another; points closer than 2 ``tolerance`` are merged.
+    """Return each edge cut at its intersections; points closer than 2 ``tolerance`` are merged.
 
-    The order of the edges does not change the cuts. Meeting points of an arc are searched along its
-    circle, so an arc that was bent before is replaced by one through both ends.
+    The order of the edges does not change the cuts. Intersections of an arc are computed on its
+    circle, so a previously bent arc is replaced by one through both ends.
     """
     whole, edges = edges, [from_end_to_end(edge) for edge in edges]
     cuts: list[list[Point]] = [[] for _ in edges]
@@ -173,7 +175,7 @@ def _share(
     bounds: Sequence[Bounds],
     tolerance: float,
 ) -> None:
-    """Add the cuts of each edge to the edges that run along it, until none is new."""
+    """Add the cuts of each edge to the edges that coincide with it, until there are no new ones."""
     partners: dict[int, list[int]] = defaultdict(list)
     for i, j in meeting:
         partners[i].append(j)
@@ -243,7 +245,7 @@ def _offset(edge: Edge, a: Point, b: Point) -> float:
 
 
 def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
-    """One piece for each group of edges with common ends whose middles are near each other."""
+    """Return one piece for each group of edges with common ends and nearly equal midpoints."""
     entries.sort()
     start = 0
     for stop in range(1, len(entries) + 1):
@@ -257,9 +259,10 @@ def _united(entries: list[_Entry], same: float) -> Iterator[Piece]:
 
 
 def _plainest(entry: _Entry) -> tuple[float, Point, int]:
-    """Sort key: lines first, then arcs by radius, so that the choice does not depend on the order.
+    """Return a sort key: lines first, then arcs by radius, so that the choice is independent of
+    order.
 
-    Among edges that differ in direction only, the first is chosen.
+    Among edges that differ only in direction, the first is chosen.
     """
     _, number, edge, _ = entry
     if isinstance(edge, Arc):
@@ -279,7 +282,7 @@ NEAR = 0.05
 
 
 class _Leaving(NamedTuple):
-    """A piece as it leaves a point: its direction there, its chord, its bend, its end."""
+    """A piece that leaves a point: its direction there, its chord, its curvature and its end."""
 
     half: int
     edge: Edge
@@ -294,7 +297,7 @@ class _Leaving(NamedTuple):
         return -distance if self.half & 1 else distance
 
     def towards(self, reach: float) -> float:
-        """Return the angle from the point to where the piece is ``reach`` away."""
+        """Return the angle from the point to the place on the piece at the distance ``reach``."""
         return self.heading + math.asin(max(-1.0, min(1.0, self.bend * reach / 2)))
 
 
@@ -312,7 +315,7 @@ def _leaving(half: int, edge: Edge) -> _Leaving:
 
 
 class Arrangement:
-    """Pieces, each of them two halves: 2 i along piece i, 2 i + 1 against it."""
+    """Pieces with two halves each: 2 i along piece i, 2 i + 1 against it."""
 
     def __init__(self, overlay: Overlay) -> None:
         self.pieces, bent = overlay
@@ -374,7 +377,7 @@ class Arrangement:
         return self._by_place
 
     def _around(self, p: Point, winding: Sequence[int | None]) -> int:
-        """Return the winding number round a point of the pieces with a number in ``winding``."""
+        """Return the winding number around a point of the pieces with a number in ``winding``."""
         x, y = p
         return sum(
             self.pieces[number].turns * turns_round(self._drawn[number], p)
@@ -397,9 +400,9 @@ class Arrangement:
         return [turns for turns in winding if turns is not None]
 
     def _verify(self) -> None:
-        """Check the winding number beside one piece of each part that clear points connect.
+        """Check the winding number beside one piece of each part connected by clear points.
 
-        Raises InconsistentError if it differs from the number that was carried there.
+        Raises InconsistentError if it differs from the propagated number.
         """
         visited: set[int] = set()
         for first in range(len(self.pieces)):
@@ -448,7 +451,7 @@ class Arrangement:
         return [leaving.half for leaving in ring if leaving.heading > upward][-1], p
 
     def _carry(self, half: int, turns: int, winding: list[int | None]) -> None:
-        """Set the winding numbers of all of a group from the number to the left of one half."""
+        """Propagate the winding numbers of a group from the number to the left of one half."""
         winding[half] = turns
         waiting = [half]
         done: set[Point] = set()
@@ -476,7 +479,7 @@ class Arrangement:
                     raise InconsistentError(here)
 
     def edging(self, inside: Container[int]) -> list[int]:
-        """Return the halves with a winding number of ``inside`` on their left alone."""
+        """Return the halves that have a winding number of ``inside`` on their left only."""
         winding = self.left
         return [
             half
@@ -485,7 +488,7 @@ class Arrangement:
         ]
 
     def loops(self, halves: Sequence[int]) -> Iterator[list[Edge]]:
-        """Yield closed loops through all of the halves; those that touch at a point stay apart."""
+        """Yield closed loops through all halves; loops that touch at a point stay separate."""
         free = dict.fromkeys(halves)
         for first in halves:
             if first not in free:
@@ -522,9 +525,9 @@ class Arrangement:
 def _by_side(a: _Leaving, b: _Leaving) -> int:
     """Compare by side: negative if ``b`` runs to the left of ``a``.
 
-    The shorter one ends clear of the other, since it would have been cut there otherwise. If both
-    end in one point they are compared halfway: the difference at the start and the distance at the
-    end differ in sign only by rounding.
+    The shorter one ends clear of the other, otherwise it would have been cut there. If both end in
+    one point they are compared at midway: the difference at the start and the distance at the end
+    differ in sign only by rounding.
     """
     short, long = (a, b) if a.chord <= b.chord else (b, a)
     offset = long.to_left(short.end)

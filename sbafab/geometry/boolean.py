@@ -1,8 +1,8 @@
 """Boolean operations on contours of lines and arcs, exact except that points within SAME merge.
 
 Contours that meet are overlaid; a piece is kept if the result lies on only one side of it, and
-the kept pieces are chained into contours. Contours that meet no other are kept or dropped
-whole. Nothing is flattened.
+these pieces are chained into contours. Isolated contours are kept or dropped whole. Arcs are never
+flattened.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ a quarter of a micrometre.
 
 
 def more_than(turns: int) -> Membership:
-    """Membership of places with a winding number above ``turns``."""
+    """Return the membership of points with a winding number above ``turns``."""
     return partial(lt, turns)
 
 
@@ -65,7 +65,7 @@ def combined(
 
 
 def _whole(chain: ClosedChain, outside: int, is_in: Membership) -> list[Contour]:
-    """A chain that nothing meets, with the material on its left; empty if it bounds none."""
+    """An isolated chain with the material on its left; empty if it bounds no material."""
     contour = chain.contour
     inside = outside + (-chain.turns if contour.is_hole else chain.turns)
     if is_in(inside) == is_in(outside):
@@ -76,20 +76,20 @@ def _whole(chain: ClosedChain, outside: int, is_in: Membership) -> list[Contour]
 def _cut(
     group: ChainGroup, memberships: Sequence[Membership], tolerance: float
 ) -> list[list[Contour]]:
-    """The contours of each region, where chains meet each other."""
+    """Return the contours of each region for chains that meet."""
     arrangement = Arrangement(overlay(group.edges, tolerance, group.clear))
     return [bounding(arrangement, is_in, group.outside) for is_in in memberships]
 
 
 def bounding(arrangement: Arrangement, is_in: Membership, outside: int = 0) -> list[Contour]:
-    """Contours round the faces of a membership; ``outside`` is added to their winding numbers."""
+    """Return contours around the faces of a membership; ``outside`` is added to winding numbers."""
     turns = {turns for turns in set(arrangement.left) if is_in(turns + outside)}
     loops = map(tidy, arrangement.loops(arrangement.edging(turns)))
     return [settled(contour) for contour in loops if contour is not None]
 
 
 def arranged(owners: Sequence[Iterable[Edge]], read: Callable[[Arrangement], Result]) -> Result:
-    """Return ``read`` of the closed chains of edges of all owners, laid over each other.
+    """Return ``read`` for the overlaid closed chains of edges of all owners.
 
     Raises GeometryError if no tolerance gives a consistent result.
     """
@@ -106,8 +106,8 @@ def _in_some_way(read: Callable[[float], Result]) -> Result:
             place = place or fault.args[0]
     x, y = place or (0.0, 0.0)
     raise GeometryError(
-        f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be told apart; change a size "
-        "there by 0.001 mm"
+        f"edges that nearly meet at x {x:.6f}, y {y:.6f} cannot be distinguished; change a "
+        "dimension there by 0.001 mm"
     )
 
 
@@ -123,10 +123,10 @@ FAR = 1e-3
 
 
 class ClosedChain:
-    """A closed chain, and how many times it and its duplicates count together.
+    """A closed chain, and the total count of it and its duplicates.
 
-    ``outline`` is the first of them; ``contour`` is its tidy form if it is ``alone``: clear of
-    itself.
+    ``outline`` is the first of them; ``contour`` is its tidy form if it is ``alone``, that is, does
+    not meet itself.
     """
 
     __slots__ = ("alone", "circle", "contour", "outline", "start", "turns")
@@ -141,7 +141,7 @@ class ClosedChain:
         self.start: Point = self.contour.edges[0].start
 
     def turns_round(self, chain: ClosedChain) -> int:
-        """Winding number of the contour round another chain that does not meet it."""
+        """Return the contour's winding number around another chain that does not meet it."""
         if self.circle is None:
             return self.contour.winding(chain.start)
         (centre, radius) = self.circle
@@ -151,9 +151,9 @@ class ClosedChain:
 
 
 def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
-    """Chains in order of first appearance; those along the same edges are merged.
+    """Return chains in order of first appearance, with coincident chains merged.
 
-    Chains that cancel out are left out.
+    Chains that cancel out are omitted.
     """
     chains: list[ClosedChain] = []
     circles: dict[tuple[Point, float], ClosedChain] = {}
@@ -179,9 +179,9 @@ def chains_of(contours: Iterable[CountedContour]) -> list[ClosedChain]:
 
 
 class ChainGroup(NamedTuple):
-    """Chains that meet, or one that stays clear of all others.
+    """Chains that meet, or one isolated chain.
 
-    The chains of all other groups wind round it ``outside`` times.
+    The chains of all other groups wind around it ``outside`` times.
     """
 
     chains: list[ClosedChain]
@@ -189,12 +189,12 @@ class ChainGroup(NamedTuple):
 
     @property
     def is_alone(self) -> bool:
-        """True if it is one chain that meets nothing."""
+        """True if it is one isolated chain."""
         return len(self.chains) == 1 and self.chains[0].alone
 
     @property
     def edges(self) -> list[tuple[Edge, int]]:
-        """The edges of all its chains, and how many times each counts."""
+        """The edges of all its chains, with their counts."""
         return [(edge, chain.turns) for chain in self.chains for edge in chain.outline.edges]
 
     @property
@@ -205,7 +205,7 @@ class ChainGroup(NamedTuple):
 
 
 def grouped(chains: Sequence[ClosedChain]) -> list[ChainGroup]:
-    """Chains by groups that stay clear of each other."""
+    """Return the chains in groups that do not meet each other."""
     count = len(chains)
     home = list(range(count))
     windings: list[dict[int, int]] = [{} for _ in range(count)]
@@ -269,7 +269,7 @@ def _meet(a: ClosedChain, b: ClosedChain) -> bool:
 def _clear_of_all(
     edge: Edge, box: Bounds, obstacles: tuple[Edge, ...], boxes: tuple[Bounds, ...]
 ) -> bool:
-    """Return True if an edge surely stays farther than FAR from all obstacles."""
+    """Return True if an edge is certain to stay farther than FAR from all obstacles."""
     low_x, low_y, high_x, high_y = widened(box, FAR)
     for obstacle, b in zip(obstacles, boxes, strict=True):
         meets = b[0] <= high_x and b[2] >= low_x and b[1] <= high_y and b[3] >= low_y
@@ -279,7 +279,7 @@ def _clear_of_all(
 
 
 def _clear(a: Edge, b: Edge) -> bool:
-    """Return True if two edges surely stay farther than FAR from each other."""
+    """Return True if two edges are certain to stay farther than FAR from each other."""
     if isinstance(a, Arc):
         if isinstance(b, Arc):
             gap = math.dist(a.centre, b.centre)
@@ -294,14 +294,14 @@ def _clear(a: Edge, b: Edge) -> bool:
 
 
 def _clear_of_circle(line: Line, arc: Arc) -> bool:
-    """Return True if a line keeps clear of an arc's whole circle, outside or inside."""
+    """Return True if a line stays clear of an arc's whole circle, outside or inside."""
     if abs(line.to_left(arc.centre)) > arc.radius + FAR:
         return True
     return line.farthest_from(arc.centre) < arc.radius - FAR
 
 
 def alone(contour: Contour) -> Contour | None:
-    """The tidy form of a contour that stays clear of itself; None if it may meet itself."""
+    """Return the tidy form of a contour that does not meet itself; None if it may."""
     values = contour.__dict__
     if "alone" not in values:
         form = tidy(contour.edges) if _keeps_clear(contour) else None
@@ -316,19 +316,19 @@ def alone(contour: Contour) -> Contour | None:
 
 
 def settled(contour: Contour) -> Contour:
-    """Mark a contour as clear of itself, since it has been cut where it met edges."""
+    """Mark a contour as free of self-intersections, since its edges were cut at intersections."""
     contour.__dict__["alone"] = True
     return contour
 
 
 def meets_itself(contour: Contour) -> Contour:
-    """Mark a contour that comes near itself, so that ``alone`` need not test it."""
+    """Mark a contour that comes near itself, so that ``alone`` skips the test."""
     contour.__dict__["alone"] = False
     return contour
 
 
 def turned_round(contour: Contour) -> Contour:
-    """The reversed tidy form of a contour that is ``alone``."""
+    """Return the reversed tidy form of a contour that is ``alone``."""
     return stored(contour, "turned_round", _turned)
 
 
@@ -340,7 +340,7 @@ def _turned(contour: Contour) -> Contour:
 
 
 def _keeps_clear(contour: Contour) -> bool:
-    """Return True if only edges that follow each other come within FAR of each other."""
+    """Return True if only consecutive edges come within FAR of each other."""
     edges, count = contour.edges, len(contour.edges)
     least = max(LEAST_AREA, FAR * contour.length)
     if abs(contour.area) < least or any(from_end_to_end(edge) is not edge for edge in edges):

@@ -1,4 +1,4 @@
-"""Caches: values stored in records, results of functions."""
+"""Caches: values stored in records, and results of functions."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MOST = 256
 def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Value:
     """Return ``compute(record)``, computed once and stored in the record under ``name``.
 
-    For values of a record that another module defines. The value must not hold the record.
+    This is for values of a record that another module defines. The value must not hold the record.
     """
     values = record.__dict__
     if name not in values:
@@ -27,8 +27,8 @@ def stored(record: Record, name: str, compute: Callable[[Record], Value]) -> Val
 
 
 class _Call:
-    """Arguments of a function, told apart by their exact numbers: regions compare equal within a
-    tolerance.
+    """Arguments of a function, compared by their exact numbers, since regions compare equal within
+    a tolerance.
     """
 
     __slots__ = ("arguments", "hash", "named")
@@ -63,7 +63,7 @@ def _is_same(a: Any, b: Any) -> bool:
 def cached(function: Callable[Arguments, Value], most: int = MOST) -> Callable[Arguments, Value]:
     """Return the function with a cache of its last ``most`` results.
 
-    Arguments are regions, tuples of them, and other values that hash. A result is shared between
+    Arguments are regions, tuples of them, and other hashable values. A result is shared between
     calls and must not be changed.
     """
 

@@ -1,6 +1,6 @@
-"""Contours: closed chains of lines and arcs, their tidy form, chords that replace arcs, and copies.
+"""Contours: closed chains of lines and arcs, their tidy form, chords in place of arcs, and copies.
 
-A contour keeps the material on its left: outer contours run counter-clockwise, holes clockwise.
+A contour has the material on its left: outer contours run counter-clockwise, holes clockwise.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ Similarity = Callable[[Point], Point]
 
 @dataclass(frozen=True)
 class Contour:
-    """One closed chain of edges; each edge starts where the one before it ends."""
+    """One closed chain of edges; each edge starts where the previous one ends."""
 
     edges: tuple[Edge, ...]
 
@@ -73,7 +73,7 @@ class Contour:
 
     @cached_property
     def start_hash(self) -> int:
-        """A hash of the points where edges start: equal for equal edges, rarely for others."""
+        """A hash of the start points of edges: equal for equal edges, and rarely for others."""
         return hash(tuple([edge.start for edge in self.edges]))
 
     @cached_property
@@ -89,12 +89,12 @@ class Contour:
 
     @cached_property
     def runs(self) -> tuple[tuple[Edge, ...], ...]:
-        """The edges grouped by the line or circle they lie on, from the first corner on."""
+        """The edges grouped by their common line or circle, from the first corner on."""
         return tuple(runs(self.edges))
 
     @property
     def vertices(self) -> tuple[Mark, ...]:
-        """x, y and bulge of each vertex, as a DXF polyline carries them."""
+        """The x, y and bulge of each vertex, as in a DXF polyline."""
         return tuple((*edge.start, edge.bulge) for edge in self.edges)
 
     @cached_property
@@ -108,7 +108,7 @@ class Contour:
         return ((*centre, -radius if self.is_hole else radius),)
 
     def coincides(self, contour: Contour) -> bool:
-        """Return True if the corners and edge middles of the two lie within SAME of each other."""
+        """Return True if the corners and edge midpoints of both contours agree within SAME."""
         if len(self.marks) != len(contour.marks) or self.is_hole != contour.is_hole:
             return False
         if any(abs(a - b) > SAME for a, b in zip(self.bounds, contour.bounds, strict=True)):
@@ -123,11 +123,11 @@ class Contour:
         )
 
     def reversed(self) -> Contour:
-        """Return the contour run through the other way: a hole for an outline."""
+        """Return the contour in the opposite direction: a hole for an outline."""
         return Contour(tuple([edge.reversed() for edge in reversed(self.edges)]))
 
     def mapped(self, point: Similarity, scale: float, mirror: bool) -> Contour:
-        """Return the contour under a similarity given by its effect on points."""
+        """Return the contour under a similarity, given as a function of points."""
         # Each edge starts where the one before it ends.
         starts = [point(edge.start) for edge in self.edges]
         ends = [*starts[1:], starts[0]]
@@ -195,14 +195,14 @@ one side of it.
 
 
 def chord_step(half: float, least: int) -> float:
-    """Angle of a chord: no more than twice ``half``, at most a ``least``-th of a whole turn."""
+    """Return the angle of a chord: at most twice ``half``, and at most 1 / ``least`` of a turn."""
     return math.tau / (4 * math.ceil(max(least, math.ceil(math.pi / half)) / 4))
 
 
 def ticks(run: Sequence[Edge], step: float, room: float) -> list[float]:
-    """Angles, in the run's direction, of the chords' ends on a run of arcs of one circle.
+    """Return the angles of the chord ends on a run of arcs of one circle, in the run's direction.
 
-    None lies within ``room`` steps of the run's ends; a whole circle has all of them.
+    No end lies within ``room`` steps of the run's ends; a whole circle has all of them.
     """
     first = run[0]
     assert isinstance(first, Arc)
@@ -221,10 +221,10 @@ def run_sweep(run: Sequence[Edge]) -> float:
 
 
 def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Point]:
-    """Vertices in mm of a polygon that stands in for the contour.
+    """Return the vertices in mm of a polygon that approximates the contour.
 
-    The height of an arc over its chord is ``sagitta`` mm at most. To keep the area, vertices on a
-    circle stand two thirds of the sagitta outside it; corners, where arcs meet other edges, do not.
+    The height of an arc over its chord is at most ``sagitta`` mm. To preserve the area, vertices on
+    a circle lie two thirds of the sagitta outside it; corners, where arcs meet other edges, do not.
     """
     points: list[Point] = []
     for run in contour.runs:
@@ -253,10 +253,10 @@ def facets(contour: Contour, sagitta: float, keeps_area: bool = True) -> list[Po
 
 
 def run_chords(run: Sequence[Edge], grows: bool, error: float) -> list[Point]:
-    """Vertices of chords within ``error`` mm of a run, without the last, where the next run begins.
+    """Return vertices of chords within ``error`` mm of a run, without the last, where the next run
+    starts.
 
-    If it ``grows``, everything left of the run is left of the chords; otherwise everything left of
-    the chords is left of the run.
+    If it ``grows``, everything left of the run is left of the chords; otherwise the reverse holds.
     """
     first = run[0]
     if isinstance(first, Line):
@@ -296,9 +296,10 @@ NANOMETRE = 1e-6
 
 
 def tidy(loop: Sequence[Edge]) -> Contour | None:
-    """Return a closed chain with edges of one support joined and arcs of at most a quarter turn.
+    """Return a closed chain with collinear or cocircular edges joined and arcs of at most a quarter
+    turn.
 
-    None if it encloses rounding dust only.
+    None if it encloses only rounding errors.
     """
     contour = Contour(tuple(loop))
     if abs(contour.area) < LEAST_AREA:
@@ -314,9 +315,9 @@ def tidy(loop: Sequence[Edge]) -> Contour | None:
 
 
 def _has_room(contour: Contour) -> bool:
-    """True if a very thin contour is SLIVER wide somewhere beside an edge.
+    """Return True if a very thin contour is SLIVER wide somewhere beside an edge.
 
-    A long sliver would hide such a place in its mean width.
+    The mean width of a long sliver would hide such a place.
     """
     into = -SLIVER / 2 if contour.area < 0 else SLIVER / 2
     for edge in contour.edges:
@@ -334,7 +335,7 @@ def _has_room(contour: Contour) -> bool:
 
 
 def _first_edge(edges: Sequence[Edge]) -> int:
-    """Number of the edge whose start has the least x, then the least y, to 1 nm."""
+    """Return the number of the edge whose start has the least x, then the least y, to 1 nm."""
     limit = min([edge.start[0] for edge in edges]) + 2 * NANOMETRE
     first, least = 0, (math.inf, math.inf)
     for i, edge in enumerate(edges):
@@ -355,15 +356,15 @@ def _joined(run: Sequence[Edge]) -> Sequence[Edge]:
 
 
 def nanometres(value: float) -> int:
-    """Return the whole nanometres nearest to a length in mm.
+    """Return a length in mm, rounded to nanometres.
 
-    Comparing coordinates this way gives nearly equal shapes the same order.
+    Rounded coordinates give nearly equal shapes the same order.
     """
     return math.floor(value * 1e6 + 0.5)
 
 
 def in_reading_order(contours: Sequence[Contour]) -> tuple[Contour, ...]:
-    """Outer contours, then holes, each from left to right."""
+    """Return outer contours, then holes, each from left to right."""
     # Fast path: most regions have one or two.
     return tuple(sorted(contours, key=_reading_order) if len(contours) > 1 else contours)
 

@@ -1,4 +1,4 @@
-"""Edges and sides of boundaries in NumPy arrays, for searches over many places at once."""
+"""Edges and sides of boundaries in NumPy arrays, for searches at many points at once."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class EdgeTable:
 
     @staticmethod
     def of(edges: Sequence[Edge], boxes: Sequence[Bounds] | None = None) -> EdgeTable:
-        """Return the table of edges; ``boxes`` are their bounds, if computed already."""
+        """Return the table of edges; ``boxes`` are their bounds if already computed."""
         bounds = boxes if boxes is not None else [edge.bounds for edge in edges]
         rows = [
             (*e.start, *e.end, *e.centre, e.radius, 1.0 if e.ccw else -1.0, *box)
@@ -72,11 +72,11 @@ class EdgeTable:
         return EdgeTable(np.concatenate([table.columns for table in tables], axis=1))
 
     def at(self, numbers: Indices) -> EdgeTable:
-        """The edges with these numbers, in their order."""
+        """Return the edges with these numbers, in their order."""
         return EdgeTable(self.columns.take(numbers, axis=1))
 
     def normal(self, p: Floats) -> Floats:
-        """Unit normals to the left of travel, for each edge at its own point."""
+        """Return the unit normals to the left of travel, for each edge at one point."""
         chord = self.end - self.start
         out = p - self.centre
         x = np.where(self.turn == 0, -chord[1], -self.turn * out[0])
@@ -87,7 +87,7 @@ class EdgeTable:
 
     @cached_property
     def half_turn(self) -> Floats:
-        """Half of the angles that edges turn through."""
+        """Half of the sweep of each edge."""
         a, b = self.start - self.centre, self.end - self.centre
         turn = np.arctan2(self.turn * (a[0] * b[1] - a[1] * b[0]), dot(a, b))
         half: Floats = np.where(turn < -1e-9, turn + math.tau, np.maximum(turn, 0.0)) / 2
@@ -95,16 +95,16 @@ class EdgeTable:
 
     @cached_property
     def middle(self) -> Floats:
-        """The points half way."""
+        """The midpoints."""
         a, turn = self.start - self.centre, self.turn * self.half_turn
         c, s = np.cos(turn), np.sin(turn)
         on_arc = self.centre + np.array([a[0] * c - a[1] * s, a[0] * s + a[1] * c])
         return np.where(self.turn == 0, (self.start + self.end) / 2, on_arc)
 
     def faces(self, p: Floats, room: float = 0.0) -> Bools:
-        """Return True for each arc whose own point lies within its sweep, seen from the centre.
+        """Return True for each arc whose point, seen from the centre, lies within its sweep.
 
-        ``room`` is a share of the radius by which the point may lie past an end.
+        ``room`` is a fraction of the radius by which the point may lie beyond an end.
         """
         out, a, b = p - self.centre, self.start - self.centre, self.end - self.centre
         least = -room * self.radius * self.radius
@@ -113,7 +113,7 @@ class EdgeTable:
         return ahead
 
     def distance(self, p: Floats) -> Floats:
-        """Least distance of each edge from its own point."""
+        """Return the least distance of each edge from one point."""
         chord, off = self.end - self.start, p - self.start
         square = dot(chord, chord)
         t = dot(chord, off) / np.where(square == 0, 1.0, square)
@@ -146,16 +146,16 @@ def touching(queries: Floats, boxes: Floats) -> tuple[Indices, Indices]:
 
 
 def boxes_round(p: Floats, q: Floats, margin: float) -> Floats:
-    """Return boxes of the segments from ``p`` to ``q``, with ``margin`` on every side."""
+    """Return the boxes around the segments from ``p`` to ``q``, with ``margin`` on every side."""
     return np.concatenate([np.minimum(p, q) - margin, np.maximum(p, q) + margin])
 
 
 def crossings(
     origin: Floats, unit: Floats, edges: EdgeTable, tolerance: float = EPSILON
 ) -> tuple[Floats, Bools]:
-    """Return distances along straight lines to where each meets its edge's line or circle.
+    """Return distances along straight lines to the intersections with each edge's line or circle.
 
-    Three rows (the foot of a tangent, and two crossings), and a mask of the ones that exist.
+    Three rows (the foot of a tangent, and two crossings), and a mask of those that exist.
     """
     chord = edges.end - edges.start
     off = edges.start - origin

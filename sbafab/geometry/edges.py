@@ -57,7 +57,7 @@ class Line:
 
     @property
     def segment_area(self) -> float:
-        """Area between the chord and the edge (none)."""
+        """The area between the chord and the edge: 0."""
         return 0.0
 
     @property
@@ -306,8 +306,8 @@ def quarter_arcs(
 
 
 def from_end_to_end(edge: Edge) -> Edge:
-    """The edge; an arc with an end off its circle by more than BENT becomes the arc of equal sweep
-    through both ends.
+    """Return the edge; an arc with an end off its circle by more than BENT becomes the arc of equal
+    sweep through both ends.
     """
     if not isinstance(edge, Arc) or edge.ends_lie_on_circle:
         return edge
@@ -333,7 +333,7 @@ def distance_to(edge: Edge, p: Point) -> float:
 
 
 def turns_round(edge: Edge, p: Point) -> int:
-    """Return the share of an edge in its contour's winding number round ``p``."""
+    """Return the contribution of an edge to its contour's winding number around ``p``."""
     px, py = p
     x0, y0 = edge.start
     x1, y1 = edge.end
@@ -359,7 +359,7 @@ def turns_round(edge: Edge, p: Point) -> int:
 
 
 def box_round(boxes: Sequence[Bounds]) -> Bounds:
-    """Return the bounding box of all boxes; without boxes, one that contains nothing."""
+    """Return the bounding box of all boxes; an inverted box if there are none."""
     low_x = low_y = math.inf
     high_x = high_y = -math.inf
     for box in boxes:
@@ -379,7 +379,7 @@ DRIFT = 4 * EPSILON
 
 
 def runs(edges: _Run) -> Iterator[_Run]:
-    """The edges grouped by the line or circle they lie on, from the first corner on."""
+    """Return the edges grouped by their common line or circle, from the first corner on."""
     breaks = [i for i in range(len(edges)) if not same_support(edges[i - 1], edges[i])]
     if not breaks:
         yield from _parted(edges)
@@ -389,7 +389,7 @@ def runs(edges: _Run) -> Iterator[_Run]:
 
 
 def same_support(a: Edge, b: Edge) -> bool:
-    """True if two edges lie on one circle, or are lines of one direction, and turn the same way."""
+    """Return True if two edges lie on one circle, or are parallel lines, and turn the same way."""
     if isinstance(a, Arc) and isinstance(b, Arc):
         return (
             a.ccw == b.ccw
@@ -404,7 +404,7 @@ def same_support(a: Edge, b: Edge) -> bool:
 
 
 def _parted(run: _Run) -> Iterator[_Run]:
-    """Yield the run in parts that each follow one line or circle.
+    """Yield the parts of the run that each follow one line or circle.
 
     Every pair of neighbours may look straight although the run as a whole turns a corner.
     """
@@ -442,7 +442,7 @@ def _off_circle(edge: Edge, head: Arc) -> float:
 
 
 def meeting_points(a: Edge, b: Edge, tolerance: float = EPSILON) -> list[Point]:
-    """Return the points that lie on both edges, to within the tolerance.
+    """Return the points that lie on both edges, within the tolerance.
 
     Overlapping edges give the ends of the shared stretch.
     """
@@ -483,7 +483,7 @@ def _line_line(a: Line, b: Line) -> list[Point]:
 def line_circle(
     origin: Point, unit: Point, centre: Point, radius: float, tolerance: float = EPSILON
 ) -> list[Point]:
-    """The crossings of the infinite line through ``origin`` with a circle; a touch counts once."""
+    """Crossings of the infinite line through ``origin`` with a circle; a tangent counts once."""
     ox, oy = origin
     ux, uy = unit
     cx, cy = centre

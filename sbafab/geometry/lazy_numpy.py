@@ -1,4 +1,4 @@
-"""NumPy, imported at the first use of one of its names: the help of commands need not wait."""
+"""NumPy, imported at first use so that the help of commands starts fast."""
 
 from __future__ import annotations
 

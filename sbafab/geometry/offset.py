@@ -1,4 +1,4 @@
-"""Offsets of regions that keep arcs as arcs: growing and shrinking, and the path of a beam."""
+"""Offsets of regions that preserve arcs: growing and shrinking, and the path of a beam."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def fillet(region: Region, radius: float) -> Region:
 
 
 def _chain(contour: Contour, distance: float) -> Contour:
-    """A closed chain that winds round the contour's inside and the bands beside its edges."""
+    """A closed chain that winds around the contour's inside and the bands beside its edges."""
     if contour.circle is not None and alone(contour):
         centre, radius = contour.circle
         radius += -distance if contour.is_hole else distance
@@ -82,7 +82,7 @@ def _chain(contour: Contour, distance: float) -> Contour:
 
 
 def _joined_up(edges: Sequence[Edge]) -> Iterator[Edge]:
-    """Yield the edges with ends merged that differ by a rounding."""
+    """Yield the edges with ends merged if they differ only by rounding."""
     starts = [edge.start for edge in edges]
     for i, start in enumerate(starts):
         end = edges[i - 1].end
@@ -121,7 +121,7 @@ def _moved(contour: Contour, distance: float) -> Iterator[Edge]:
 
 
 def _both_cover(before: Edge, after: Edge, distance: float) -> bool:
-    """True if the bands of two lines both hold the triangle of a corner and the ends beside it."""
+    """True if the bands of two lines both hold the triangle of a corner and the adjacent ends."""
     if not (isinstance(before, Line) and isinstance(after, Line)):
         return False
     turn = left_turn(before, after)
@@ -138,10 +138,10 @@ def _lines(stops: Sequence[Point]) -> list[Edge]:
 
 
 def _corner_arcs(before: Edge, after: Edge, distance: float) -> Iterator[Arc]:
-    """The arcs round a convex corner; empty if the path is smooth or turns the other way.
+    """Return the arcs around a convex corner; empty if the path is smooth or turns the other way.
 
     At the tip of a cusp, rounding decides whether the path turns left or right, so it always gets
-    its arcs there: round the end of a notch they lie in the material and drop out.
+    arcs there: at the end of a notch they lie in the material and are discarded.
     """
     turn = left_turn(before, after)
     if -CUSP < turn < EPSILON / distance:
@@ -185,15 +185,15 @@ class Lost(NamedTuple):
 
 
 def widths(kerf: Kerf) -> tuple[float, float]:
-    """Full width along x and along y."""
+    """The full width along x and along y."""
     return kerf if isinstance(kerf, tuple) else (kerf, kerf)
 
 
 def beam_path(region: Region, kerf: Kerf) -> tuple[Region, Lost | None]:
-    """The path of the beam's centre that leaves ``region``, and the first contour of the region
-    without a single path; both widths are 0, or neither is.
+    """Return the path of the beam's centre around ``region``, and the first contour without a
+    single path.
 
-    Raises GeometryError if the offset cannot be computed.
+    Both widths are 0, or neither is. Raises GeometryError if the offset cannot be computed.
     """
     a, b = (width / 2 for width in widths(kerf))
     reach = max(a, b)
@@ -217,7 +217,7 @@ def _stretched(
 ) -> Region:
     """Return a region stretched along x and y, with edges fitted to the images of arcs.
 
-    Raises GeometryError for arcs that cannot be followed.
+    Raises GeometryError for arcs that cannot be fitted.
     """
     images = []
     for runs in contours:
@@ -255,7 +255,7 @@ def _pieces(run: SmoothRun, sx: float, sy: float, fit: ArcFit) -> list[Edge]:
 
 
 def _image(arcs: Sequence[Arc], sx: float, sy: float) -> Curve:
-    """Return the stretched arcs as one curve, by the share of their turn, 0 to 1."""
+    """The stretched arcs as one curve, with the fraction of their sweep as parameter."""
     turned = list(accumulate(abs(arc.sweep) for arc in arcs))
 
     def image(share: float) -> tuple[Point, Point]:
@@ -292,7 +292,7 @@ def _unit(way: Point) -> Point:
 
 
 def _smooth_runs(edges: Sequence[Edge]) -> list[list[Edge]]:
-    """Lines, and arcs that go on from each other without a corner and with little more bend."""
+    """Lines, and runs of arcs that join without a corner and with little change of curvature."""
     count = len(edges)
     starts = [i for i in range(count) if not _goes_on(edges[i - 1], edges[i])] or [0]
     stops = [*starts[1:], starts[0] + count]
@@ -316,7 +316,7 @@ def _lost(
     owners = [n for n, contour in enumerate(stretched) for _ in contour.edges]
 
     def nearest(p: Point) -> int:
-        """Return the contour of the edge nearest to a point ``reach`` away from them."""
+        """Return the contour with the edge nearest to a point ``reach`` away from it."""
         numbers = list(near.numbers(widened((*p, *p), 1.01 * reach))) or range(len(owners))
         return owners[min(numbers, key=lambda n: (round(distance_to(near.edges[n], p), 9), n))]
 
@@ -342,8 +342,8 @@ SHORT_TURN = 1.5
 def swept(path: Sequence[Edge], width: float, has_round_ends: bool) -> Region:
     """Return the area swept by a tool of ``width`` mm along a chain of edges, with exact arcs.
 
-    The chain may be closed, and may cross, touch or retrace itself. An open one has round or
-    square ends; the tool turns on the spot at corners, so they are round on the outside.
+    The chain may be closed, and may cross, touch or retrace itself. An open chain has round or
+    square ends; the tool rotates in place at corners, so they are round on the outside.
     """
     half = width / 2
     is_closed = math.dist(path[0].start, path[-1].end) < EPSILON
@@ -370,7 +370,7 @@ def dragged(region: Region, way: Edge) -> Region:
 
 
 def _short(edge: Edge) -> list[Edge]:
-    """The edge, with an arc split into parts of less than a quarter turn."""
+    """Return the edge, with arcs split into parts of less than a quarter turn."""
     count = math.ceil(abs(edge.sweep) / SHORT_TURN) if isinstance(edge, Arc) else 1
     return [edge.part(edge.at(k / count), edge.at((k + 1) / count)) for k in range(count)]
 
@@ -388,7 +388,7 @@ def _sums(a: Edge, b: Edge) -> Iterator[Region]:
 
 
 def _slid(edge: Edge, way: Edge) -> Iterator[Sequence[Edge]]:
-    """Yield outlines of the area swept by an edge along a line, split where both are parallel."""
+    """Outlines of the area swept by an edge along a line, split where the two are parallel."""
     shares = [0.0, 1.0]
     if isinstance(edge, Arc):
         (u, v), (x, y), r = way.direction(way.start), edge.centre, edge.radius
@@ -436,7 +436,7 @@ def _sums_of_arcs(a: Arc, b: Arc) -> Iterator[Sequence[Edge]]:
 
 
 def _outline(cell: Sequence[Point], a: Arc, b: Arc) -> list[Edge]:
-    """The sums along the edges of a cell of angles: arcs of either arc, or of both at the fold."""
+    """Sums along the edges of a cell of angles: arcs of either arc, or of both at the fold."""
     centre = a.centre[0] + b.centre[0], a.centre[1] + b.centre[1]
 
     def on(middle: Point, radius: float, angle: float) -> Point:
@@ -457,7 +457,7 @@ def _outline(cell: Sequence[Point], a: Arc, b: Arc) -> list[Edge]:
 
 
 def shortened(path: Sequence[Edge], length: float) -> tuple[Edge, ...]:
-    """Return a chain of edges shortened by ``length`` mm at each end; a closed one is unchanged."""
+    """Return a chain shortened by ``length`` mm at each end; a closed chain is unchanged."""
     if math.dist(path[0].start, path[-1].end) < EPSILON:
         return tuple(path)
     edges = list(path)

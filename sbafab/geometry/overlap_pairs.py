@@ -1,4 +1,4 @@
-"""Overlap pairs: segments square on edges that are barely longer than the shortest one."""
+"""Overlap pairs: segments perpendicular to edges that are barely longer than the shortest one."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ STEP = math.radians(15)
 def sampled(edges: Sequence[Edge], room: float = 0.0) -> tuple[list[Point], list[int]]:
     """Return samples of all edges, one edge after the other, and the count of each.
 
-    A line has both ends and the middle, an arc at least one sample every 15 degrees; the outermost
-    samples lie ``room`` mm inside the ends.
+    A line has both ends and the midpoint, an arc at least one sample every 15 degrees; the
+    outermost samples lie ``room`` mm inside the ends.
     """
     points: list[Point] = []
     counts: list[int] = []
@@ -54,14 +54,14 @@ NEAR = 10 * TOUCH
 
 
 class OverlapPairs(NamedTuple):
-    """Segments square on edges at both ends, each once: x and y of both ends, and their lengths."""
+    """Unique segments perpendicular to edges at both ends: coordinates and lengths."""
 
     start: Floats
     end: Floats
     value: Floats
 
     def at(self, some: Bools) -> OverlapPairs:
-        """Return the places of a mask."""
+        """Return the places selected by a mask."""
         return OverlapPairs(self.start[:, some], self.end[:, some], self.value[some])
 
 
@@ -71,9 +71,9 @@ def overlap_pairs(
 ) -> OverlapPairs:
     """Return the places of a region that are at most ``slack`` mm wider than the narrowest.
 
-    They include places where edges are square on each other, and samples along nearly parallel
-    edges: these may become the narrowest if a layer turns. A corner below ``sharp`` degrees has
-    width 0; ``least`` is the least width, if measured already.
+    They include segments perpendicular to both edges, and samples along nearly parallel edges,
+    which may become the narrowest if a layer rotates. A corner below ``sharp`` degrees has width 0;
+    ``least`` is the least width, if already measured.
     """
     boundary = boundary_of(region, sharp)
     least = least or least_of(boundary, math.inf)
@@ -114,7 +114,7 @@ def _from_samples(boundary: Boundary, within: float) -> Segments:
 
 
 def _first_of_each(p: Floats, q: Floats) -> Indices:
-    """The numbers of the first segment with given ends, in either order, to 10 nm."""
+    """Return the numbers of the first segment with given ends, in either order, to 10 nm."""
     ends = np.rint(np.concatenate([p, q]) * 1e5)
     turned = (ends[0] > ends[2]) | ((ends[0] == ends[2]) & (ends[1] > ends[3]))
     ends = np.where(turned, ends[[2, 3, 0, 1]], ends)

@@ -103,11 +103,7 @@ class Region:
 
     @cached_property
     def key(self) -> str:
-        """A name for the shape, from its corners rounded to 1 nm; the same on every machine.
-
-        Equal keys mean equal shapes. Nearly equal shapes may round to different keys; compare with
-        ``==``.
-        """
+        """A name for the shape, from its corners rounded to 1 nm; the same on every machine."""
         rings = []
         for contour in self.contours:
             # Adding 0.0 turns -0.0 into 0.0.
@@ -125,7 +121,7 @@ class Region:
 
     @cached_property
     def exact_hash(self) -> int:
-        """A hash of the contours' exact numbers, in their order."""
+        """A hash of the exact coordinates of the contours, in order."""
         return hash(tuple([contour.start_hash for contour in self.contours]))
 
     def is_exactly(self, other: object) -> bool:
@@ -151,7 +147,7 @@ class Region:
         return True
 
     def contains(self, p: Point) -> bool:
-        """Return True if ``p``, not on an edge, lies in the region."""
+        """Return True if ``p``, which must not be on an edge, lies in the region."""
         return sum(contour.winding(p) for contour in self.contours) > 0
 
     def distance_to_edge(self, p: Point) -> float:
@@ -168,7 +164,7 @@ class Region:
         return difference(self, other)
 
     def mapped(self, point: Similarity, scale: float, mirror: bool) -> Region:
-        """Return the region under a similarity given by its effect on points."""
+        """Return the region under a similarity, given as a function of points."""
         return Region(tuple([contour.mapped(point, scale, mirror) for contour in self.contours]))
 
     def moved(self, dx: float, dy: float) -> Region:
@@ -193,7 +189,7 @@ class Region:
         return self.mapped(lambda p: (-p[0], p[1]), 1.0, True)
 
     def shapely(self, chord_error: float = 0.001) -> shapely.MultiPolygon:
-        """The region for shapely; chords stay within ``chord_error`` mm of the arcs."""
+        """The region as a shapely geometry; chords stay within ``chord_error`` mm of the arcs."""
         # Imported here only.
         import shapely
 
@@ -210,7 +206,7 @@ class Region:
 
     @property
     def __geo_interface__(self) -> dict[str, object]:
-        """A MultiPolygon in the terms of GeoJSON; chords stay within 1 um of the arcs."""
+        """A GeoJSON MultiPolygon; chords stay within 1 um of the arcs."""
         rings = [[[*ring, ring[0]] for ring in piece] for piece in self.polygons()]
         return {"type": "MultiPolygon", "coordinates": rings}
 
@@ -262,16 +258,13 @@ def _difference(a: Region, b: Region) -> Region:
 
 
 def enclosed(contours: Iterable[Contour], above: int = 0) -> Region:
-    """Return the points that closed chains wind round more than ``above`` times together.
-
-    Raises GeometryError if no tolerance for cutting edges gives a consistent result.
-    """
+    """Return the points around which closed chains wind more than ``above`` times in total."""
     (outlines,) = combined([(contour, 1) for contour in contours], [more_than(above)])
     return Region(outlines)
 
 
 def centroid(region: Region) -> Point:
-    """Centre of area of a region that is not empty."""
+    """Return the area centroid of a region that is not empty."""
     x, y = region.edges[0].start
     mx = my = 0.0
     for edge in region.edges:
@@ -281,7 +274,7 @@ def centroid(region: Region) -> Point:
 
 
 def _moment(edge: Edge, origin: Point) -> Point:
-    """First moment about ``origin`` of the triangle to the edge's chord and the arc's segment."""
+    """Return the first moment about ``origin`` of the edge's triangle and the arc's segment."""
     ox, oy = origin
     (x0, y0), (x1, y1) = edge.start, edge.end
     x0, y0, x1, y1 = x0 - ox, y0 - oy, x1 - ox, y1 - oy
@@ -307,7 +300,7 @@ def disc(centre: Point, radius: float) -> Region:
 
 
 def polygon(points: Sequence[Point]) -> Region:
-    """The region inside straight edges through ``points``, in either order."""
+    """Return the region inside straight edges through ``points``, in either order."""
     contour = Contour(
         tuple(Line(points[i], points[(i + 1) % len(points)]) for i in range(len(points)))
     )
@@ -319,7 +312,7 @@ def rectangle(low: Point, high: Point) -> Region:
 
 
 def strip(start: Point, end: Point, width: float) -> Region:
-    """A straight strip of the given width with square ends."""
+    """Return a straight strip of the given width with square ends."""
     length = math.dist(start, end)
     nx = -(end[1] - start[1]) / length * width / 2
     ny = (end[0] - start[0]) / length * width / 2
@@ -334,7 +327,7 @@ def strip(start: Point, end: Point, width: float) -> Region:
 
 
 def stadium(centre: Point, width: float, length: float) -> Region:
-    """A slot shape ``width`` across x and ``length`` along y; a disc if they are equal."""
+    """Return a slot ``width`` across x and ``length`` along y; a disc if they are equal."""
     x, y = centre
     r = width / 2
     half = length / 2 - r
@@ -368,10 +361,7 @@ NEAR = 1e-3
 
 
 def section(region: Region, origin: Point, direction: Point) -> list[Interval]:
-    """The stretches of a line inside the region, as distances in mm from ``origin``.
-
-    ``direction`` is a unit vector. The line may touch an edge but must not run along one.
-    """
+    """Return the stretches of a line inside the region, as distances in mm from ``origin``."""
     if region.is_empty:
         return []
     (ox, oy), (ux, uy) = origin, direction

@@ -1,4 +1,4 @@
-"""Boxes and edges that come near each other, found without comparing all pairs one by one."""
+"""Search for nearby boxes and edges without comparing all pairs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sbafab.geometry.lazy_numpy import np
 
 
 def widened(box: Bounds, margin: float) -> Bounds:
-    """The box with ``margin`` added on every side."""
+    """Return the box with ``margin`` added on every side."""
     return box[0] - margin, box[1] - margin, box[2] + margin, box[3] + margin
 
 
@@ -56,7 +56,7 @@ class EdgeIndex:
         return numbers
 
     def all_within(self, box: Bounds) -> bool:
-        """Return True if no edge reaches out of the box."""
+        """Return True if no edge extends beyond the box."""
         low_x, low_y, high_x, high_y = self._boxes
         meets = (low_x >= box[0]) & (high_x <= box[2]) & (low_y >= box[1]) & (high_y <= box[3])
         return bool(meets.all())

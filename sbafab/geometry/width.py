@@ -1,7 +1,7 @@
-"""The least width of a region, and of the gaps in it, between edges that face each other.
+"""The least width of a region, and of its gaps, between facing edges.
 
-A width is the length of a segment inside the material that is square on the edge at both ends (a
-reflex corner counts as an edge shrunk to a point). Offsets would miss widths between corners;
+A width is the length of a segment inside the material that is perpendicular to the edge at both
+ends (a reflex corner counts as an edge of length 0). Offsets would miss widths between corners;
 these are exact for lines and arcs.
 """
 
@@ -63,7 +63,7 @@ NOTCH = 15.0
 
 
 class Width(NamedTuple):
-    """A least distance in mm and the two facing points it lies between."""
+    """A least distance in mm and its two end points."""
 
     value: float
     start: Point
@@ -76,9 +76,8 @@ class Width(NamedTuple):
 
 @cached
 def least_width(region: Region, sharp: float = 90.0, below: float = math.inf) -> Width | None:
-    """Return the narrowest place of the material below ``below`` mm; None if no edge faces another.
-
-    A corner with an interior angle below ``sharp`` degrees has width 0.
+    """Return the narrowest place of the material below ``below`` mm; None if no edges face each
+    other.
     """
     return least_of(boundary_of(region, sharp), below)
 
@@ -91,7 +90,7 @@ def least_gap(region: Region, sharp: float = 90.0, below: float = math.inf) -> W
 
 
 def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
-    """Return the place at which a beam's path loses a contour: the closing slot, or its middle."""
+    """Return the place where a beam's path loses a contour: the closing slot, or its middle."""
     if lost.fate != "vanishes":
         slot = least_gap(region, NOTCH, max(widths(kerf)))
         if slot is not None:
@@ -101,9 +100,10 @@ def place_of(region: Region, lost: Lost, kerf: Kerf) -> Point:
 
 
 class Boundary:
-    """The edges of contours in arrays, with the material on their left, and the corner that each
-    starts at: the directions of travel ``into`` and ``out`` of it, and its ``turn``, more than 0 if
-    it is convex.
+    """The edges of contours in arrays, with the material on their left.
+
+    Each edge starts at a corner with directions of travel ``into`` and ``out`` of it, and a
+    ``turn``, positive if convex.
     """
 
     def __init__(self, contours: Sequence[Contour], sharp: float) -> None:
@@ -150,8 +150,8 @@ class Boundary:
     def pairs(self, aside: float, within: float) -> tuple[Indices, Indices]:
         """Return pairs (a, b) of edges that may face each other within a distance, in order.
 
-        ``aside`` is the angle that normals may turn by. Normals of ``b`` may meet ``a``; a pair may
-        come both ways.
+        ``aside`` is the angle by which normals may turn. Normals of ``b`` may meet ``a``; a pair
+        may occur in both orders.
         """
         table = self.table
         a, b = touching(boxes_round(table.box[:2], table.box[2:], within), table.box)
@@ -196,7 +196,7 @@ class Boundary:
         return np.stack(feet, axis=2), np.stack(normals, axis=2), np.stack(there, axis=1)
 
     def square(self, within: float) -> Segments:
-        """Return segments up to a length that are square on edges at both ends or join corners."""
+        """Segments up to a length, perpendicular to edges at both ends or between corners."""
         ahead, count = self.pairs(SQUARE, within), len(self.edges)
         pairs = sorted(set((np.minimum(*ahead) * count + np.maximum(*ahead)).tolist()))
         a, b = np.divmod(np.array(pairs, dtype=np.intp), count)
@@ -211,7 +211,7 @@ class Boundary:
         return p[:, near], q[:, near]
 
     def _centred(self, a: Indices, b: Indices) -> Found:
-        """The centre line of a line and an arc, or of two arcs, is square on both."""
+        """Centre-line segments of a line and an arc, or of two arcs, perpendicular to both."""
         table = self.table
         is_arc = table.turn != 0
         # The first is an arc, if either is.
@@ -233,7 +233,7 @@ class Boundary:
         return _facing(np.arange(len(a)), p, normal, q, inward, there)
 
     def _alongside(self, a: Indices, b: Indices) -> Found:
-        """From middles and ends of edges to parallel lines and concentric arcs."""
+        """Segments from midpoints and ends of edges to parallel lines and concentric arcs."""
         table = self.table
         u, v = self.normal.take(a, axis=1), self.normal.take(b, axis=1)
         parallel = (dot(u, v) < 0) & (np.abs(_cross(u, v)) < ALONGSIDE)
@@ -249,7 +249,7 @@ class Boundary:
         return _facing(np.tile(pair, 6), p[:, :, None], normal[:, :, None], q, inward, there)
 
     def _at_corners(self, corner: Indices, side: Indices) -> Found:
-        """From corners to edges."""
+        """Return segments from corners to edges."""
         starts = self.table.start
         turn, p = self.turn.take(corner), starts.take(corner, axis=1)
         reflex = turn < 0
@@ -274,7 +274,7 @@ class Boundary:
         return some.nonzero()[0], np.broadcast_to(p, q.shape)[:, some], q[:, some]
 
     def _between_corners(self, corner: Indices, side: Indices) -> Found:
-        """From reflex corners to other ones, which may face each other although no edges do."""
+        """Segments between reflex corners, which may face each other although no edges do."""
         turn = np.maximum(self.turn.take(corner), self.turn.take(side))
         pair = ((side > corner) & (turn < -SMOOTH)).nonzero()[0]
         corner, side = corner[pair], side[pair]
@@ -283,7 +283,7 @@ class Boundary:
         return pair[both], p[:, both], q[:, both]
 
     def _squarely(self, corner: Indices, d: Floats) -> Bools:
-        """True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
+        """Return True if a reflex corner is nearer than its neighbourhood to the end of ``d``."""
         shape = (2, len(corner)) + (1,) * (d.ndim - 2)
         into, out = (ways.take(corner, axis=1).reshape(shape) for ways in (self.into, self.out))
         room = 1e-9 * length_of(d)
@@ -306,7 +306,7 @@ def joined(*segments: Segments) -> Segments:
 
 
 def _in_order(*parts: Found) -> Segments:
-    """Segments of several kinds by the numbers of their pairs."""
+    """Return segments of several kinds, ordered by the numbers of their pairs."""
     pair = np.concatenate([numbers for numbers, _, _ in parts])
     p, q = joined(*((p, q) for _, p, q in parts))
     order = pair.argsort(kind="stable")
@@ -323,7 +323,7 @@ def _facing(
 
 
 def _ahead(edges: EdgeTable, p: Floats) -> Floats:
-    """The directions of travel at points of edges."""
+    """Return the directions of travel at points of edges."""
     x, y = edges.normal(p)
     return np.array([y, -x])
 
@@ -403,14 +403,14 @@ class _Run(NamedTuple):
         return left_turn(self.last, after.first)
 
     def is_fillet(self, bottom: _Run) -> bool:
-        """Return True if it rounds a corner of the run beside it, which turns less tightly."""
+        """Return True if it rounds a corner of the adjacent run, which turns less tightly."""
         return self.sweep > 0 and (bottom.sweep <= 0 or self.radius < bottom.radius)
 
 
 def tapered_ends(contour: Contour, sharp: float) -> Iterator[tuple[Point, Point]]:
-    """Yield the ends of the flanks of every tapered end in a contour with the arm on its left.
+    """Yield the flank ends of every tapered end of a contour with the material on its left.
 
-    A rounded corner is an end if the sharp corner would have less than ``sharp`` degrees.
+    A rounded corner is tapered if the sharp corner would have less than ``sharp`` degrees.
     """
     runs = [_Run(edges[0], edges[-1], run_sweep(edges)) for edges in contour.runs]
     corners = [runs[i - 1].corner(run) for i, run in enumerate(runs)]
@@ -437,7 +437,7 @@ def _between_flanks(
 ) -> Iterator[tuple[Point, Point]]:
     """Yield the ends of the path along runs ``start`` to ``stop``, if it turns back between flanks.
 
-    ``corners``: the turn into each run.
+    ``corners`` are the turns into each run.
     """
     if stop - start + 3 > len(runs):
         return
@@ -460,8 +460,10 @@ class InscribedDisc(NamedTuple):
 
 @cached
 def inscribed_disc(region: Region) -> InscribedDisc:
-    """Return the largest disc within a region that is not empty: exact for a circle, otherwise
-    within 1e-4 of its radius, taken from the centre of the region's last nonempty offset.
+    """Return the largest disc in a non-empty region: exact for a circle, else within 1e-4 of its
+    radius.
+
+    It is computed from the centre of the region's last non-empty offset.
     """
     if len(region.edges) > MANY_EDGES:
         # Offsets of many edges that meet near one point take minutes: a disc in 75 chords 38 s.

@@ -1,5 +1,5 @@
-"""Import what other programs wrote as a design of drawn layers.
+"""Import files of other programs as a design of drawn layers.
 
-In: a folder of drawings, a laminate.json, ParchMint, polygons or popupCAD. Out: an ``Imported``:
-``design.toml`` with the drawings of its layers.
+Input: a folder of drawings, a laminate.json, ParchMint, polygons or popupCAD. Output: an
+``Imported``: ``design.toml`` with the drawings of its layers.
 """

@@ -45,7 +45,7 @@ def import_folder(folder: Path) -> Imported:
     if data.get("family") == ASSEMBLY:
         parts = sorted(path.parent.name for path in folder.glob(f"*/{DESIGN}"))
         hint = f"import one of its designs: {listed(parts)} in {folder}"
-        raise DesignError(f"{folder} holds an assembly, and drawn layers are one laminate; {hint}")
+        raise DesignError(f"{folder} holds an assembly, but drawn layers form one laminate; {hint}")
     laminate = read_laminate(_beside(folder))
     design = load_design(folder / DESIGN)
     tables = _shared_tables(design, laminate)
@@ -81,7 +81,7 @@ def import_laminate(path: Path) -> Imported:
     try:
         stock = checked(Films, films, {}, "films.").stock
     except DesignError as error:
-        raise DesignError(f"{path.name} holds a film that no design takes: {error}") from None
+        raise DesignError(f"{path.name} has a film that is invalid in a design: {error}") from None
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
         if stock[names[film.material]].shade != film.shade:
             # Films of no layer still count when the other films get their colours.
@@ -116,13 +116,13 @@ def _beside(folder: Path) -> Path:
     path = folder / FILE
     if not path.is_file():
         raise DesignError(
-            f"{folder} holds no {FILE}, which every run of this version writes; generate it again"
+            f"{folder} has no {FILE}, which this version writes in every run; generate it again"
         )
     return path
 
 
 def _shared_tables(design: Design, laminate: Laminate) -> dict[str, Any]:
-    """Sections common to all families, where they differ from the kit and the defaults."""
+    """Return sections common to all families, if they differ from the kit and the defaults."""
     rest = without_kit(plain_tables(design), design)
     shared = {
         key: rest[key]
@@ -186,8 +186,8 @@ def _chamber_row(laminate: Laminate, chamber: Chamber) -> dict[str, Any]:
     inlets = [inlet for inlet in laminate.inlets if inlet.chamber == chamber.name]
     if len(inlets) != 1:
         raise DesignError(
-            f"chamber {chamber.name} has {len(inlets)} inlets, and a chamber of drawn layers "
-            "has one; give each inlet a chamber, or join them"
+            f"chamber {chamber.name} has {len(inlets)} inlets, but a chamber of drawn layers has "
+            "one; give each inlet a chamber, or join them"
         )
     (inlet,) = inlets
     row = {
@@ -232,7 +232,7 @@ def _add_joints(
 
 
 def _corners(chain: Sequence[Edge]) -> list[list[float]]:
-    """The corners of an open chain: x, y, and the bulge of the edge to the next if it is an arc."""
+    """Return the corners of an open chain: x, y, and the bulge of an arc to the next corner."""
     corners = [
         [*edge.start] if isinstance(edge, Line) else [*edge.start, edge.bulge] for edge in chain
     ]
@@ -240,7 +240,7 @@ def _corners(chain: Sequence[Edge]) -> list[list[float]]:
 
 
 def angle_of(direction: Point) -> float:
-    """Return the angle in degrees from x of a unit vector, reproducing it to the last bit."""
+    """Return the angle in degrees from x of a unit vector, reproducible to the last bit."""
     plain = math.degrees(math.atan2(direction[1], direction[0]))
     candidates = [round(plain, 9), plain]
     low = high = plain
@@ -255,7 +255,7 @@ def angle_of(direction: Point) -> float:
 
 
 def _pitch(laminate: Laminate) -> float:
-    """Distance between stacks along the sheet, or around the whole tube for a single stack."""
+    """The distance between stacks along the sheet, or around the whole tube for one stack."""
     centres = sorted(centre for chamber in laminate.chambers for centre in chamber.centres)
     if len(centres) > 1:
         return centres[1][0] - centres[0][0]
@@ -268,7 +268,7 @@ def _pitch(laminate: Laminate) -> float:
 def _film_tables(
     laminate: Laminate, remarks: list[str]
 ) -> tuple[dict[str, dict[str, Any]], dict[str, str]]:
-    """The tables of films that are not the paper's, and each material's table."""
+    """Return the tables of films other than the paper's, and each material's table."""
     usual = Films().stock
     tables: dict[str, dict[str, Any]] = {}
     names: dict[str, str] = {}
@@ -304,7 +304,7 @@ def _film_table(name: str, film: Film) -> dict[str, Any]:
 
 
 def _layup(laminate: Laminate, names: Mapping[str, str]) -> dict[str, str]:
-    """The film of each role's first layer, unless it is the usual one."""
+    """Return the film of each role's first layer, unless it is the default."""
     layup: dict[str, str] = {}
     for layer in laminate.layers:
         layup.setdefault(layer.role.replace("-", "_"), names[layer.film.material])

@@ -48,7 +48,7 @@ AnyRow = TypeVar("AnyRow", bound=Section)
 
 
 class LayerEntry(Section):
-    """A row of ``layers.csv``."""
+    """A row of ``layers.csv``: one layer of the laminate."""
 
     file: str
     role: Role
@@ -58,7 +58,7 @@ class LayerEntry(Section):
 
 
 class ChamberEntry(Section):
-    """A row of ``chambers.csv``."""
+    """A row of ``chambers.csv``: the centre of one pocket."""
 
     name: str
     x: Coordinate
@@ -119,11 +119,11 @@ def import_table(folder: Path) -> Imported:
 def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]:
     """Yield place and record of every row of a CSV file. Raises DesignError with line and column.
 
-    An empty cell states nothing, unless its column is not known.
+    An empty cell has no meaning, unless its column is unknown.
     """
     rows = [*table_rows(path)]
     if not 0 < len(rows) <= MOST_ROWS:
-        raise DesignError(f"{path} has {len(rows)} rows under its head; add some")
+        raise DesignError(f"{path} has {len(rows)} rows below its header; give 1 to {MOST_ROWS}")
     for where, row in rows:
         place = where.replace(str(path), path.name)
         filled = {key: cell for key, cell in row.items() if cell or key not in record.model_fields}
@@ -131,13 +131,13 @@ def read_table(path: Path, record: type[AnyRow]) -> Iterator[tuple[str, AnyRow]]
 
 
 def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes, list[str]]:
-    """The name and content of a row's only drawing, and remarks on it."""
+    """Return the name and content of a row's only drawing, and remarks about it."""
     path, layer = folder / row.file, row.layer or ""
     suffix = path.suffix.lower()
     if suffix not in (*DRAWINGS, *SUFFIXES, SUFFIX):
         raise DesignError(
-            f"{place}: file = {shown(row.file)} is no DXF or SVG, no JSON or YAML of polygons, and "
-            "no popupCAD design"
+            f"{place}: file = {shown(row.file)} is not a DXF or SVG file, a JSON or YAML file of "
+            "polygons, or a popupCAD design"
         )
     try:
         if suffix in DRAWINGS:
@@ -152,20 +152,22 @@ def _drawing(folder: Path, row: LayerEntry, place: str) -> tuple[str, bytes, lis
 
 
 def _chambers(path: Path) -> list[dict[str, Any]]:
-    """The chambers of a table; rows with the same name add centres to one chamber."""
+    """Return the chambers of a table; rows with the same name add centres to one chamber."""
     chambers: dict[str, dict[str, Any]] = {}
     for place, row in read_table(path, ChamberEntry):
         if row.name in chambers:
             second = next((key for key in MOUTH if getattr(row, key) is not None), None)
             if second is not None:
                 raise DesignError(
-                    f"{place}: {second} of {row.name} stands in an earlier row; leave it empty"
+                    f"{place}: {second} of {row.name} is given in an earlier row; leave it empty"
                 )
             chambers[row.name]["centres"].append([row.x, row.y])
             continue
         missing = next((key for key in MOUTH[:3] if getattr(row, key) is None), None)
         if missing is not None:
-            raise DesignError(f"{place} has no {missing}, of the first row of {row.name}; add it")
+            raise DesignError(
+                f"{place} is the first row of {row.name} but has no {missing}; add it"
+            )
         table = {"name": row.name, "centres": [[row.x, row.y]], "mouth": [row.mouth_x, row.mouth_y]}
         chambers[row.name] = without_none({**table, "angle": row.angle, "width": row.width})
     return list(chambers.values())
@@ -192,7 +194,7 @@ def polygon_layer(path: Path, layer: str) -> Region:
     geoms = layers[layer_index(path, layer, len(layers))]
     region = union(p for i, geom in enumerate(geoms, 1) for p in _parts(path, layer, i, geom))
     if region.is_empty:
-        raise DesignError(f"{path}, layer {layer} holds no polygon; leave its row out")
+        raise DesignError(f"{path}, layer {layer} has no polygon; omit its row")
     return region
 
 
@@ -225,7 +227,7 @@ def _document(path: Path, text: str) -> Any:
 
 
 def _plain_loader(yaml: Any) -> Any:
-    """Objects of foldable_robotics are read as plain ones; no others are created."""
+    """A loader that reads objects of foldable_robotics as plain ones and creates no others."""
     loader: Any = type("Loader", (yaml.SafeLoader,), {})
     for tag in LAMINATE_TAGS:
         loader.add_constructor(tag, lambda made, node: made.construct_mapping(node, deep=True))
@@ -248,8 +250,8 @@ def _parts(path: Path, layer: str, number: int, text: str) -> Iterator[Region]:
         if piece.geom_type != "Polygon":
             x, y, *_ = piece.bounds if not piece.is_empty else (0.0, 0.0)
             raise DesignError(
-                f"{where} holds a {piece.geom_type} at x {x:g}, y {y:g}, and a layer is cut from "
-                "polygons; make it one, or leave it out"
+                f"{where} has a {piece.geom_type} at x {x:g}, y {y:g}, but a layer needs "
+                "polygons; convert or omit it"
             )
         if not piece.is_empty:
             yield region_of(piece)

@@ -47,7 +47,7 @@ PLAIN = frozenset({PORT, VIA, "NODE", "VALVE", "VALVE3D", "REACTION CHAMBER"})
 
 
 def _pair(value: object) -> object:
-    """A point as [x, y] or as an object with x and y."""
+    """Return a point as [x, y] or as an object with x and y."""
     return [value.get("x"), value.get("y")] if isinstance(value, Mapping) else value
 
 
@@ -161,7 +161,7 @@ def import_parchmint(path: Path) -> Imported:
 
 
 class Component(NamedTuple):
-    """A component: upper left corner, width and height, um; ``radius`` of those that are discs."""
+    """A component: upper left corner, width and height, um; ``radius`` if it is a disc."""
 
     id: str
     entity: str
@@ -186,14 +186,14 @@ class Circuit:
     """
 
     def __init__(self, document: Mapping[str, Any], stem: str) -> None:
-        """Raises DesignError with the place in the file."""
+        """Read a circuit. Raises DesignError with the place in the file."""
         file = checked(CircuitFile, document, {}, file="circuit")
         self.name = name_of(file.name or stem) or name_of(stem) or UNNAMED
         self.nets, self.labels = parchmint_nets(document), parchmint_labels(document)
         rows = sorted(file.layers, key=lambda row: row.group_number)
         self.titles = {row.id: row.name or row.id for row in rows if row.is_mask}
         if not self.titles:
-            raise DesignError("layers holds no layer with channels; export the circuit again")
+            raise DesignError("layers has no layer with channels; export the circuit again")
         skipped = [f"layer {row.name or row.id}" for row in file.layers if not row.is_mask]
         self.remarks = named("holds no channels; it is not imported", skipped)
         self.components: dict[str, Component] = {}
@@ -232,8 +232,8 @@ class Circuit:
             )
         if min(span) < 0 or (max(span) <= 0 and entity != "NODE"):
             raise DesignError(
-                f"{here} has no size (x-span, y-span), for its kind was not known to what wrote "
-                "the file; give it one, or leave it out"
+                f"{here} has no size (x-span, y-span), because the writing program does not know "
+                "its kind; add a size, or omit it"
             )
         if entity not in PLAIN:
             self.remarks.append(
@@ -252,9 +252,7 @@ class Circuit:
             raise DesignError(f"{here} lies on a layer {shown(row.layer)} that has no channels")
         for end in (row.source, *row.sinks):
             if end.component not in self.components:
-                raise DesignError(
-                    f"{here} names a component {shown(end.component)} that is not there"
-                )
+                raise DesignError(f"{here} names a missing component {shown(end.component)}")
             if row.layer not in self.components[end.component].layers:
                 self.remarks.append(
                     f"{here}: ends at {end.component}, which is not on layer "
@@ -285,7 +283,7 @@ class Circuit:
 
     def mask(self, layer: str) -> Region:
         """Return the channels and components of a layer. Raises DesignError if contours touch at a
-        single point: whether they connect is ambiguous.
+        single point, since it is ambiguous whether they connect.
         """
         parts = [self._outline(c) for c in self.components.values() if layer in c.layers]
         parts += [self._channel(r, width) for on, r, width in self.channels if on == layer]
@@ -295,7 +293,7 @@ class Circuit:
             x, y = self.middle[0] + place[0] / MM, self.middle[1] - place[1] / MM
             raise DesignError(
                 f"layer {self.titles[layer]}: channels or components touch in a single point at "
-                f"x {x:.6g}, y {y:.6g} um; draw them apart, or over each other"
+                f"x {x:.6g}, y {y:.6g} um; separate or overlap them"
             )
         return mask
 
@@ -325,7 +323,7 @@ class Circuit:
         empty = [f"layer {self.titles[layer]}" for layer in drawn if layer not in masks]
         self.remarks += named("holds nothing; it is not imported", empty)
         if not masks:
-            raise DesignError("no layer holds anything; there is nothing to import")
+            raise DesignError("all layers are empty; there is nothing to import")
         top = 2 * len(masks) + 1
         numbers = {layer: number for number, layer in zip(range(2, top, 2), masks, strict=True)}
         low_x, low_y, high_x, high_y = box_round([mask.bounds for mask in masks.values()])
@@ -334,8 +332,8 @@ class Circuit:
         ports = self._ports(holes, numbers, top)
         if not any(row.get("kind") == "hole" for row in ports):
             raise DesignError(
-                "components holds no PORT with params.portRadius, um, on the bottom or top layer, "
-                "and no tube reaches any other; add one"
+                "components has no PORT with params.portRadius, um, on the bottom or top layer, "
+                "where tubes connect; add one"
             )
         layers = {numbers[layer]: (self.titles[layer], mask) for layer, mask in masks.items()}
         films = range(1, top + 1, 2)
@@ -402,7 +400,7 @@ def _refuse_unplaced(rows: Sequence[ComponentRow], placed: Mapping[Any, object])
     positions = [row.params and row.params.position for row in rows if row.id not in placed]
     if len(positions) > 1 and len(set(positions)) == 1:
         raise DesignError(
-            f"none of the {len(positions)} components has a place of its own (params.position, or "
+            f"none of the {len(positions)} components has a distinct position (params.position, or "
             "a feature with its location); place and route the circuit first"
         )
 
@@ -428,5 +426,5 @@ def _drawn_layers(
 
 
 def _hole(radius: float) -> float:
-    """Hole radius, mm, that leaves one overhang of its mask's disc if there is room."""
+    """Return the hole radius, mm, that leaves one overhang of its mask's disc if there is room."""
     return max(radius * MM - OVERHANG, min(LEAST_HOLE, radius * MM / 2))

@@ -52,7 +52,7 @@ OLD_PLACES = ("_pos", "__pos", "_Vertex__pos")
 
 @dataclass(frozen=True, eq=False)
 class CadRecord:
-    """An object of the file: the last word of its class name, and its attributes or items."""
+    """An object of the file: the last part of its class name, and its attributes or items."""
 
     kind: str
     values: dict[Any, Any] = field(default_factory=dict)
@@ -69,7 +69,7 @@ class CadRecord:
 
 
 def _record_loader(yaml: Any) -> Any:
-    """A loader of plain values and records only."""
+    """Return a loader of plain values and records only."""
     loader: Any = type("Loader", (getattr(yaml, "CSafeLoader", yaml.SafeLoader),), {})
 
     def record(made: Any, suffix: str, node: Any) -> Iterator[CadRecord]:
@@ -98,7 +98,7 @@ def _record_loader(yaml: Any) -> Any:
 
 @contextmanager
 def _at(place: str) -> Iterator[None]:
-    """Add the place to an error, and make one of what a damaged object raises.
+    """Add the place to an error, and convert exceptions from a damaged object.
 
     A message that begins with a comma or colon continues the place.
     """
@@ -115,7 +115,7 @@ def _at(place: str) -> Iterator[None]:
 
 
 class Flat(NamedTuple):
-    """Geometry of a layer; lines and points have no area until an offset widens them."""
+    """The geometry of a layer; lines and points have no area until an offset widens them."""
 
     region: Region = Region()
     lines: tuple[Line, ...] = ()
@@ -134,7 +134,7 @@ def _joined(flats: Iterable[Flat]) -> Flat:
 
 
 def _within(flat: Flat, region: Region, inside: bool = True) -> Flat:
-    """The lines, cut, and points that are in a region, or outside it."""
+    """Return the lines, cut, and points inside a region, or outside it."""
     pieces = []
     for line in flat.lines:
         stops = {p for edge in region.edges for p in meeting_points(line, edge)}
@@ -152,7 +152,7 @@ def _combined(function: str, a: Flat, b: Flat) -> Flat:
         return _joined([a, b])
     if any(meeting_points(line, other) for line in a.lines for other in b.lines):
         raise DesignError(
-            f"takes the {function} of lines that meet, which is not read; widen them first"
+            f"takes the {function} of lines that meet, which is not supported; widen them first"
         )
     if function == "intersection":
         return _joined([Flat(a.region & b.region), _within(a, b.region), _within(b, a.region)])
@@ -160,7 +160,7 @@ def _combined(function: str, a: Flat, b: Flat) -> Flat:
     if function == "symmetric_difference":
         return _joined([rest, _combined("difference", b, a)])
     if function != "difference":
-        raise DesignError(f"has a function {shown(function)} that is not known")
+        raise DesignError(f"has an unknown function {shown(function)}")
     return rest
 
 
@@ -180,12 +180,12 @@ def _number(value: Any) -> float:
     if not isinstance(value, int | float) or isinstance(value, bool):
         raise DesignError(f"has {shown(value)} where a number is expected; save the design again")
     if not abs(value) <= FARTHEST:
-        raise DesignError(f"has {value:g} mm, where at most {FARTHEST:g} is allowed")
+        raise DesignError(f"has {value:g} mm; the limit is {FARTHEST:g} mm")
     return float(value)
 
 
 def _vertex(vertex: CadRecord) -> Point:
-    """The position of a vertex, in any of the forms that popupCAD has saved."""
+    """Return the position of a vertex, in any format saved by popupCAD."""
     if vertex.items:
         unit, (x, y) = 1.0 if vertex.kind.endswith("_1") else OLD_UNIT, vertex.items[1:3]
     else:
@@ -195,7 +195,7 @@ def _vertex(vertex: CadRecord) -> Point:
 
 
 def _points(vertices: Iterable[CadRecord]) -> list[Point]:
-    """The positions of vertices, without consecutive repeats."""
+    """Return the positions of vertices, without consecutive repeats."""
     points: list[Point] = []
     for point in map(_vertex, vertices):
         if not points or math.dist(points[-1], point) > SAME:
@@ -216,11 +216,11 @@ SHAPES = ["GenericLine", "GenericPolyline", "GenericCircle", "GenericTwoPointRec
 
 
 def _shape(shape: CadRecord) -> Flat:
-    """A shape of a sketch. Raises DesignError if it is not supported or crosses itself."""
+    """Return a shape of a sketch. Raises DesignError if it is not supported or crosses itself."""
     if _is_point(shape):
         return Flat(points=(_vertex(shape),))
     if shape.kind not in SHAPES:
-        raise DesignError(f"is a {shape.kind}, which is not read; draw its outline")
+        raise DesignError(f"is a {shape.kind}, which is not supported; draw its outline")
     points = _points(shape["exterior"])
     if len(points) < 2:
         raise DesignError(f"is a {shape.kind} of {len(points)} points; remove it")
@@ -261,7 +261,7 @@ class CadDesign:
 
     def __init__(self, root: CadRecord, place: str, depth: int = 0) -> None:
         if getattr(root, "kind", "") != "Design":
-            raise DesignError(f"{place} contains no popupCAD design; save it again")
+            raise DesignError(f"{place} is not a popupCAD design; save it again")
         self.place, self.root, self.depth = place, root, depth
         self.remarks: dict[str, None] = {}
         self._here = place
@@ -278,7 +278,7 @@ class CadDesign:
             ]
 
     def remark(self, text: str) -> None:
-        """Add a remark on the operation that is run."""
+        """Add a remark about the current operation."""
         self.remarks[self._here + text] = None
 
     def index_of(self, reference: Any) -> int:
@@ -300,8 +300,8 @@ class CadDesign:
             with _at(self._here):
                 if operation.kind not in OPERATIONS:
                     raise DesignError(
-                        f": operations of class {operation.kind} are not read; take one before "
-                        "it, or save the laminate as DXF in popupCAD"
+                        f": operations of class {operation.kind} are not supported; use an "
+                        "earlier one, or save the laminate as DXF in popupCAD"
                     )
                 self._stacks[number] = OPERATIONS[operation.kind](self, operation)
         return self._stacks[index]
@@ -316,7 +316,7 @@ class CadDesign:
                     parents = {self.index_of(reference) for row in links for reference in row}
                     if parents and max(parents) >= number:
                         raise DesignError(
-                            f"takes operation {max(parents) + 1}, which is not before it"
+                            f"refers to operation {max(parents) + 1}, which does not precede it"
                         )
                 needed |= parents
         return needed
@@ -346,7 +346,7 @@ class CadDesign:
         """Return the shapes of a sketch without construction lines."""
         sketch = self.root["sketches"].get(identity)
         if sketch is None:
-            raise DesignError("takes a sketch that is not there; save the design again")
+            raise DesignError("refers to a missing sketch; save the design again")
         return [
             (f", sketch {sketch.get('_basename') or identity}, shape {number}", shape)
             for number, shape in enumerate(sketch["operationgeometry"], 1)
@@ -423,7 +423,7 @@ def _shifted(design: CadDesign, operation: CadRecord) -> CadLayers:
 
 
 def _moved(design: CadDesign, operation: CadRecord, stack: CadLayers) -> CadLayers:
-    """Turn a stack over and move it up or down by layers, as the operation says."""
+    """Turn a stack over and move it up or down by layers, as the operation requires."""
     shift = int(operation["shift"])
     flipped = stack[::-1] if operation.get("flip") else stack
     return design.spread({number + shift: flat for number, flat in enumerate(flipped)})
@@ -438,7 +438,7 @@ def _placed_design(design: CadDesign, operation: CadRecord) -> CadLayers:
     identity = operation["design_links"]["subdesign"][0]
     root = (design.root.get("subdesigns") or {}).get(identity)
     if root is None or design.depth >= DEEPEST:
-        raise DesignError("takes a design that is not there; save the design again")
+        raise DesignError("refers to a missing design; save the design again")
     part = CadDesign(root, f", design {root.get('_basename') or identity}", design.depth + 1)
     stack = part.stack(part.index_of(operation["subopref"]))
     for remark in part.remarks:
@@ -463,7 +463,7 @@ def _two_points(place: str, shape: CadRecord) -> Sequence[Point]:
     with _at(place):
         points = _points(shape["exterior"])
         if len(points) < 2:
-            raise DesignError("is not a line to place a design by; draw one")
+            raise DesignError("cannot place a design, because it is not a line; draw a line")
     return points[:2]
 
 
@@ -482,8 +482,8 @@ def _similar(
     has_arcs = any(not isinstance(edge, Line) for flat in stack for edge in flat.region.edges)
     if not along * across or (has_arcs and not is_even):
         raise DesignError(
-            f"scales arcs by {along:g} along its line and {across:g} across it, and ellipses are "
-            "not read; give both the same scale"
+            f"scales arcs by {along:g} along its line and {across:g} across it, but ellipses are "
+            "not supported; give both the same scale"
         )
     start, end = complex(*first[0]), complex(*second[0])
     ours, theirs = complex(*first[1]) - start, complex(*second[1]) - end
@@ -506,7 +506,7 @@ def _similar(
 
 
 def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
-    """A region of straight edges under an affine map, given by its effect on points."""
+    """Return a region of straight edges under an affine map, given as a function of points."""
     outers, holes = (
         union([polygon([point(edge.start) for edge in contour.edges]) for contour in contours])
         for contours in (region.outers, region.holes)
@@ -515,7 +515,7 @@ def _stretched(region: Region, point: Callable[[Point], Point]) -> Region:
 
 
 def _frozen(design: CadDesign, operation: CadRecord) -> CadLayers:
-    """The saved result of a frozen operation."""
+    """Return the saved result of a frozen operation."""
     geometry = operation["generic"]
     flats = {}
     for material, shapes in getattr(geometry, "values", {}).get("geoms", geometry).items():
@@ -548,16 +548,12 @@ def _read(path: Path, text: str) -> CadDesign:
 
 
 def cad_design(path: Path) -> CadDesign:
-    """Return the design of a file; its operations are not run yet. Raises DesignError."""
+    """Return the design in a file; its operations have not run yet. Raises DesignError."""
     return _read(path, read_text(path, MOST_BYTES))
 
 
 def cad_layer(path: Path, layer: str) -> tuple[Region, list[str]]:
-    """Return a layer's profile, mm, and remarks on it.
-
-    ``layer`` is "OPERATION/NUMBER": an operation by its number or its name, and a layer of it from
-    1 at the bottom. Raises DesignError with the place in the file.
-    """
+    """Return a layer's profile, mm, and remarks about it."""
     design = cad_design(path)
     name, _, number = layer.rpartition("/")
     index = _operation(design, name, layer)
@@ -570,7 +566,7 @@ def cad_layer(path: Path, layer: str) -> tuple[Region, list[str]]:
         counts = f"{len(loose.lines)} lines and {len(loose.points)} points"
         remarks.append(f"{where}: {counts} have no area, and no cut")
     if flat.region.is_empty:
-        raise DesignError(f"{where} holds no area; leave its row out")
+        raise DesignError(f"{where} has no area; omit its row")
     touch = crossing(flat.region.edges)
     if touch is not None:
         raise DesignError(
@@ -590,8 +586,8 @@ def _operation(design: CadDesign, name: str, layer: str) -> int:
         return int(name) - 1
     if not name or names.count(name) != 1:
         raise DesignError(
-            f"layer {shown(layer)} of {design.place} is no OPERATION/NUMBER; the operation is one "
-            f"of 1 to {len(names)}, or a name that only one of them has"
+            f"layer {shown(layer)} of {design.place} is not OPERATION/NUMBER; the operation is a "
+            f"number from 1 to {len(names)}, or a unique name"
         )
     return names.index(name)
 

@@ -1,4 +1,4 @@
-"""The result of an import, the tables of a design and its drawings, and the files written of it."""
+"""The result of an import: the tables of a design and its drawings, and their files."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def toml_text(tables: Mapping[str, Any], head: Iterable[str] = ()) -> str:
 
 
 def _inline(value: Any) -> str:
-    """A value of TOML on one line."""
+    """Return a TOML value on one line."""
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key} = {_inline(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list | tuple):
@@ -77,7 +77,7 @@ def _inline(value: Any) -> str:
 
 
 def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
-    """Return a text as a name of small letters, digits and - that is not ``taken``."""
+    """Return a text as a name of lower case letters, digits and - that is not ``taken``."""
     stem = re.sub(r"[^a-z0-9-]+", "-", text.lower()).strip("-")[:24]
     if not stem or not stem[0].isalpha():
         stem = f"{fallback}{stem}"
@@ -90,7 +90,7 @@ def key_name(text: str, taken: Iterable[str], fallback: str = "x") -> str:
 
 
 def named(remark: str, places: list[str]) -> list[str]:
-    """Return a remark for each of the places, or one for all if they are many."""
+    """Return a remark for each of the places, or one for all if there are many."""
     remarks = [f"{place}: {remark}" for place in places[:MOST_NAMED]]
     if len(places) > MOST_NAMED:
         remarks.append(f"and {len(places) - MOST_NAMED} more places: {remark}")
@@ -111,7 +111,7 @@ def json_of(path: Path, text: str) -> Any:
 
 
 def read_yaml(path: Path, text: str, what: str, loader_of: Callable[[Any], Any]) -> Any:
-    """Return the content of YAML by the loader that is made of the module.
+    """Return the content of YAML, read by the loader that is made of the module.
 
     Raises DesignError if it is not ``what``, or the extra is not installed.
     """
@@ -119,7 +119,7 @@ def read_yaml(path: Path, text: str, what: str, loader_of: Callable[[Any], Any])
         import yaml
     except ImportError:
         raise DesignError(
-            f'{path} is YAML, which takes PyYAML to read; pip install "sbafab[yaml]"'
+            f'{path} is YAML, which needs PyYAML; pip install "sbafab[yaml]"'
         ) from None
     try:
         return yaml.load(text, loader_of(yaml))
@@ -140,7 +140,7 @@ def layer_index(path: Path | str, number: str, count: int) -> int:
 def refuse_without_table(path: Path, layers: str, layer: str, more: str = "") -> NoReturn:
     """Refuse layers that are imported without a table of them."""
     raise DesignError(
-        f"{path} holds {layers} and not what they are for; write {LAYERS} beside it, with a row "
+        f"{path} has {layers} but not their roles; write {LAYERS} beside it, with a row "
         f'"{path.name},ROLE,{layer}" a layer under "file,role,layer", and import the folder{more}'
     )
 
@@ -179,7 +179,7 @@ def write_imported(imported: Imported, file: Path, source: str) -> Written:
     for path in (file, folder) if imported.drawings else (file,):
         if path.exists():
             raise OutputError(
-                f"{path} is there already; move it, or name another place with -o or --to"
+                f"{path} already exists; move it, or choose another place with -o or --to"
             )
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -221,7 +221,7 @@ def _built(file: Path) -> tuple[Design, Laminate]:
 def _in_folder(
     tables: Mapping[str, Any], drawings: Mapping[str, bytes], folder: str
 ) -> dict[str, Any]:
-    """The tables with the drawings' paths relative to the design file."""
+    """Return the tables with the drawings' paths relative to the design file."""
 
     def place(value: Any) -> Any:
         return f"{folder}/{value}" if value in drawings else value

@@ -1,4 +1,4 @@
-"""The import formats: how a source is recognised, and which function reads it."""
+"""The import formats: how to recognise a source, and the function that reads it."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def import_source(source: Path) -> tuple[str, Imported]:
         json_of(source, read_text(source, MOST_OF_POLYGONS))
     what = "folder" if source.is_dir() else "file"
     raise DesignError(
-        f"{source} is a {what} of no format that is imported: "
+        f"{source} is a {what} in an unsupported format; supported formats: "
         + "; ".join(f.name for f in _formats())
     )
 
@@ -62,7 +62,7 @@ def import_to(
 
 
 def _is_file(*suffixes: str, mark: str = "") -> Callable[[Path], bool]:
-    """Return a test for a file with one of these suffixes, or for JSON with this text in it."""
+    """Return a test for a file with one of these suffixes, or for JSON that contains this text."""
 
     def matches(source: Path) -> bool:
         suffix = source.suffix.lower()

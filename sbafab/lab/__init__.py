@@ -1,5 +1,6 @@
-"""The lab: what was built and measured.
+"""The lab: records of builds and measurements.
 
-In: readings of builds, scans of cut sheets, widths of a kerf coupon. Out: build records with rates
-and predictions beside readings, the places and errors of cut edges, a kerf with its error.
+Input: readings of builds, scans of cut sheets, widths of a kerf coupon. Output: build records with
+success rates, predictions beside readings, positions and errors of cut edges, and a kerf with its
+uncertainty.
 """

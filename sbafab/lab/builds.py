@@ -1,4 +1,4 @@
-"""Recorded designs with their predictions: figures and the share of good builds."""
+"""Recorded designs with their predictions: quantities and the share of good builds."""
 
 from __future__ import annotations
 
@@ -39,9 +39,9 @@ MEASURED: Mapping[str, tuple[Quantity, Conditions]] = {
 class RecordedDesign:
     """A recorded design with its predictions.
 
-    ``predicted``: quantity to value and model. ``good_builds``: how many random builds keep every
-    limit, of how many. ``actuator_sha256`` is the hash of the actuator, equal for designs that
-    differ only in counts or sheets.
+    ``predicted`` maps quantities to value and model. ``good_builds`` is the number of random builds
+    that meet every limit, and their total. ``actuator_sha256`` is the hash of the actuator, equal
+    for designs that differ only in counts or sheets.
     """
 
     sha256: str
@@ -61,7 +61,7 @@ class RecordedDesign:
 
     @cached_property
     def design(self) -> Design | None:
-        """The design as this version reads it; None for an assembly or if it cannot be read.
+        """The design as read by this version; None for an assembly or if it cannot be read.
 
         The record holds the kit's values, so the kit's file is not needed. It does not hold drawn
         outlines: the file at that path may have changed.
@@ -78,9 +78,9 @@ class RecordedDesign:
 
     @cached_property
     def actuator(self) -> str:
-        """The hash that groups actuators, as this version computes it.
+        """The hash that groups actuators, as computed by this version.
 
-        So an earlier version's record groups with today's, even if keys were added since.
+        An earlier version's record therefore matches current ones, even if keys were added since.
         """
         return self.actuator_sha256 if self.design is None else actuator_sha256(self.design)
 
@@ -93,7 +93,7 @@ def recorded_sha256(built: Design | Assembled) -> str:
 def promised(built: Design | Assembled) -> RecordedDesign:
     """Return the built design with its predictions and yield. Raises DesignError.
 
-    An assembly is good if every part is; no figure is predicted for it.
+    An assembly is good if every part is; it has no predictions.
     """
     if isinstance(built, Design):
         name, family, toml = built.name, built.family, design_toml(built)
@@ -121,7 +121,7 @@ def promised(built: Design | Assembled) -> RecordedDesign:
 
 
 def _predicted(design: Design) -> dict[str, tuple[float, str]]:
-    """Return value and model of each quantity measured in the lab."""
+    """Return value and model of each predicted quantity that the lab measures."""
     request = PredictionRequest(usual_pressures(design.form)[-1:])
     figures = [figure for figure in predict(design, request).figures if not figure.other]
     return {

@@ -1,12 +1,12 @@
-"""The calibration piece, its table of measured sizes, and the kerf from them with its uncertainty.
+"""The kerf coupon, its table of measured sizes, and the kerf with its uncertainty.
 
-An outside comes out smaller by the kerf, a window larger; a constant reading error makes both
-larger, and a scale both in proportion. So all three are fitted together, by least squares of
-measured = scale * nominal -/+ kerf + offset, as far as the sizes tell them apart. What no size
-tells from kerf is an instrument that reads outsides too small and windows too large.
+An outside dimension is cut smaller by the kerf, a window larger; a constant reading error increases
+both, and a scale error changes both in proportion. All three are therefore fitted together, by
+least squares of measured = scale * nominal -/+ kerf + offset, as far as the sizes distinguish them.
+An instrument that reads outsides too small and windows too large cannot be distinguished from kerf.
 
-Uncertainties follow the usual guide to their expression: scatter and what rounding leaves in
-quadrature, Student's t for the interval.
+Uncertainties follow the Guide to the Expression of Uncertainty in Measurement: scatter and the
+residual rounding error in quadrature, with Student's t for the interval.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ Axis = Literal["x", "y"]
 
 @dataclass(frozen=True)
 class Measurement:
-    """A size of the piece, mm; ``where`` it stands in the table, for messages."""
+    """A size of the coupon, mm; ``where`` is its place in the table, for messages."""
 
     kind: Kind
     axis: Axis
@@ -71,7 +71,7 @@ class Measurement:
 
     @property
     def sign(self) -> int:
-        """The kerf's sign in the size: -1 for an outside, 1 for a window."""
+        """The sign of the kerf in the size: -1 for an outside, 1 for a window."""
         return -1 if self.kind == "outer" else 1
 
     @property
@@ -81,7 +81,7 @@ class Measurement:
 
     @property
     def kerf(self) -> float:
-        """The kerf by this size alone, mm."""
+        """The kerf from this size only, mm."""
         return self.sign * (self.measured - self.nominal)
 
     def __str__(self) -> str:
@@ -107,7 +107,7 @@ class Value:
         return self.value - self.half_width, self.value + self.half_width
 
     def differs_from(self, value: float) -> bool:
-        """Return True if the interval does not hold ``other``."""
+        """Return True if the interval does not contain ``other``."""
         return abs(self.value - value) > self.half_width
 
 
@@ -115,11 +115,11 @@ class Value:
 class Estimate:
     """The kerf in mm from ``count`` sizes, fitted together with offsets and scale.
 
-    ``offsets``: the excess of each instrument's readings, mm, by its name; empty if the sizes do
-    not determine it, and then taken as 0. ``scale``: measured over nominal size after kerf and
-    offsets; None if the sizes do not determine it, and then taken as 1. Kerf and scale are means
-    of x and y; ``kerf_along_x`` mm and ``scale_along_x``, a ratio, are added to them along x and
-    subtracted along y. ``degrees`` of freedom are left.
+    ``offsets`` holds the excess of each instrument's readings, mm, by name; empty if undetermined
+    and then assumed 0. ``scale`` is measured over nominal size after kerf and offsets; None if
+    undetermined and then assumed 1. Kerf and scale are means of x and y; ``kerf_along_x`` mm and
+    ``scale_along_x``, a ratio, are added to them along x and subtracted along y. ``degrees`` is the
+    number of degrees of freedom.
     """
 
     kerf: Value
@@ -137,11 +137,11 @@ class Estimate:
 
     @property
     def is_vague(self) -> bool:
-        """True if the kerf may be 0, or is too uncertain to compensate with."""
+        """True if the kerf may be 0, or is too uncertain for compensation."""
         return self.kerf.interval[0] <= 0 or self.kerf.half_width > WIDEST
 
     def gap(self, size: Measurement) -> float:
-        """Return the distance of a size from its value by kerf and scale, mm."""
+        """Return the distance of a size from the fitted kerf and scale, mm."""
         scale = 1.0 if self.scale is None else self.scale.value
         scale += size.along_x * self.scale_along_x
         kerf = self.kerf.value + size.along_x * self.kerf_along_x
@@ -153,7 +153,7 @@ class Estimate:
 class Calibration:
     """The kerf from all sizes, and from the sizes along x and along y if both are known.
 
-    ``difference``: kerf along x less kerf along y.
+    ``difference`` is the kerf along x minus the kerf along y.
     """
 
     overall: Estimate
@@ -168,10 +168,11 @@ class Calibration:
 
 
 def calibrated(measurements: Sequence[Measurement], resolution: float | None = None) -> Calibration:
-    """Return the kerf from two sizes or more; ``resolution`` in mm is the instrument's least step.
+    """Return the kerf from at least two sizes; ``resolution`` in mm is the instrument's smallest
+    step.
 
     By default it comes from RESOLUTIONS, the coarsest if several instruments were used. Raises
-    DesignError for fewer sizes, if one of them is a slip, or if the kerf is implausible.
+    DesignError for fewer sizes, an erroneous size, or an implausible kerf.
     """
     if resolution is None:
         steps = [RESOLUTIONS.get(size.instrument, UNNAMED) for size in measurements]
@@ -191,7 +192,7 @@ def calibrated(measurements: Sequence[Measurement], resolution: float | None = N
 def _estimate(measurements: Sequence[Measurement], resolution: float, where: str = "") -> Estimate:
     if len(measurements) < 2:
         raise DesignError(
-            f"sizes measured{where}: {len(measurements)}, and a kerf needs 2; fill in more rows"
+            f"sizes measured{where}: {len(measurements)}; a kerf needs 2; fill in more rows"
         )
     estimate = _fitted(measurements, resolution)
     kerf, scale = estimate.kerf.value, estimate.scale
@@ -203,13 +204,13 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
     if not 0 <= kerf <= LARGEST:
         kind = "negative" if kerf < 0 else f"over {LARGEST:g} mm"
         raise DesignError(
-            f"the kerf{where} comes out as {kerf:.3f} mm, which is {kind}; check the measurements, "
+            f"the kerf{where} is {kerf:.3f} mm, which is {kind}; check the measurements, "
             "the unit and which rows are outers and windows"
         )
     worst = max(measurements, key=estimate.gap)
     if estimate.gap(worst) > LARGEST_SLIP:
         raise DesignError(
-            f"{worst} is {estimate.gap(worst):.2f} mm off what the sizes together say; measure it "
+            f"{worst} is {estimate.gap(worst):.2f} mm off the fit to all sizes; measure it "
             "again, and the others too"
         )
     return estimate
@@ -218,7 +219,7 @@ def _estimate(measurements: Sequence[Measurement], resolution: float, where: str
 def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> None:
     """Raise DesignError naming the one size without which all others agree, if there is one.
 
-    A slip of the pen shifts the common fit, so that kerf or unit would be blamed.
+    A recording error shifts the common fit, so that the kerf or unit would be blamed.
     """
     middle = median(m.kerf for m in measurements) if measurements else 0.0
     slips: list[tuple[float, float, Measurement]] = []
@@ -236,13 +237,13 @@ def _refuse_a_slip(measurements: Sequence[Measurement], resolution: float) -> No
     if slips:
         _, off, slip = min(slips, key=lambda entry: entry[0])
         raise DesignError(
-            f"{slip} is {off:.2f} mm off what the other sizes say; mend the entry or measure it "
-            "again"
+            f"{slip} is {off:.2f} mm off the fit to the other sizes; correct the entry or "
+            "measure it again"
         )
 
 
 def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
-    """Return kerf, offsets and scale by least squares, likely or not; from two sizes or more."""
+    """Kerf, offsets and scale by least squares, plausible or not, from at least two sizes."""
     instruments = sorted({size.instrument for size in measurements})
     count = len(measurements)
     nominal = np.array([size.nominal for size in measurements])
@@ -287,17 +288,17 @@ def _fitted(measurements: Sequence[Measurement], resolution: float) -> Estimate:
 
 
 def _are_apart(columns: NDArray[Any]) -> bool:
-    """Return True if the sizes tell the causes of the columns from each other."""
+    """Return True if the sizes distinguish the effects of the columns."""
     unit = columns / np.linalg.norm(columns, axis=0)
     return bool(np.linalg.matrix_rank(unit, tol=SAME_COLUMN) == unit.shape[1])
 
 
 def _left_by_rounding(scatter: float, resolution: float) -> float:
-    """Return the standard uncertainty that rounding to a step leaves in a mean of readings.
+    """Return the standard uncertainty that remains in a mean of readings rounded to a step.
 
-    A mean of Gaussian readings of deviation s, rounded to steps d, is off by up to d / pi *
-    exp(-2 (pi s / d)^2) (B. Widrow, I. Kollar, Quantization Noise, 2008): of readings that all
-    agree, a step's whole width remains in doubt, and of those that scatter by half a step nothing.
+    A mean of Gaussian readings of deviation s, rounded to steps d, is off by up to d / pi * exp(-2
+    (pi s / d)^2) (B. Widrow, I. Kollar, Quantization Noise, 2008): if all readings agree, a full
+    step remains uncertain; if they scatter by half a step, nothing does.
     """
     steps = max(scatter - resolution**2 / 12, 0.0) / resolution**2 if resolution else 0.0
     return resolution / math.sqrt(12) * math.exp(-2 * math.pi**2 * steps)
@@ -305,8 +306,8 @@ def _left_by_rounding(scatter: float, resolution: float) -> float:
 
 @cache
 def student_t(degrees: int) -> float:
-    """Return the t that 95 % of Student's distribution lie within, by its series for whole degrees
-    of freedom.
+    """Return the two-sided 95 % quantile of Student's t, by its series for integer degrees of
+    freedom.
     """
     degrees = min(degrees, MOST_DEGREES)
     low, high, odd = 1.0, 20.0, degrees % 2
@@ -374,7 +375,7 @@ def coupon() -> Region:
 
 
 def coupon_csv() -> str:
-    """The table to fill in: a row for each size along each axis."""
+    """Return the table to fill in: a row for each size along each axis."""
     rows: list[Sequence[str]] = [COLUMNS]
     for frame in FRAMES:
         sizes = {"outer": frame.outer, "window": frame.window, "piece": frame.window}
@@ -387,9 +388,9 @@ def coupon_csv() -> str:
 
 
 def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
-    """Writes ``coupon.dxf``, ``.svg`` and ``.csv``, read back; never over an old one.
+    """Write ``coupon.dxf``, ``.svg`` and ``.csv``, read back, without overwriting.
 
-    Raises DesignError if one exists, OutputError if the file does not read back as drawn.
+    Raises DesignError if one exists, OutputError if the file does not match when read back.
     """
     paths = tuple(folder / f"coupon.{ending}" for ending in ("dxf", "svg", "csv"))
     for path in paths:
@@ -418,7 +419,7 @@ def write_coupon(folder: Path, generator: str) -> tuple[Path, ...]:
 
 
 def _labels() -> tuple[Stroke, ...]:
-    """Names in the waste over each frame; a title that shows which way x runs."""
+    """Return names in the waste over each frame, and a title that shows the x direction."""
     names = [strokes(f.name, (f.corner[0], f.corner[1] + f.outer[1] + 1.2), LETTER) for f in FRAMES]
     title = strokes(f"{TITLE} - X", (8.0, 4.0), LETTER)
     x, y = 44.5, 4.0 + LETTER / 2
@@ -439,11 +440,7 @@ _NUMBER = re.compile(r"[-+]?(?:\d+(?:[.,]\d*)?|[.,]\d+)", re.ASCII)
 
 
 def read_measurements(path: Path, instrument: str = "") -> list[Measurement]:
-    """Return the filled rows of a table with the coupon's columns; ``#`` begins a remark.
-
-    ``instrument`` applies to all sizes, unless a column of that name states it row by row. Raises
-    DesignError, also if decimal commas and column separators cannot be distinguished.
-    """
+    """Return the filled rows of a table with the coupon's columns; ``#`` starts a comment."""
     rows = table_rows(path, COLUMNS, NUMBERS)
     return [_measurement(row, where, instrument) for where, row in rows if row["measured_mm"]]
 

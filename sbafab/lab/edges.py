@@ -1,12 +1,12 @@
 """Edges of film in a picture, measured along the normals of the cut file's edges.
 
-Along each normal the grey level falls from film to paper; the film's edge is where it passes midway
-between their local values. Symmetric blur does not move that point on a straight edge; on a circle
-of radius r a blur of deviation s moves it by s^2 / 2r towards the centre, which is corrected.
+Along each normal the grey level falls from film to paper; the film's edge is at the midpoint of
+their local values. Symmetric blur does not move that point on a straight edge; on a circle of
+radius r a blur of deviation s moves it by s^2 / 2r toward the centre, which is corrected.
 
-All edges together give, by robust least squares, the map from the cut file to the picture, the
-offset of the film's edge outside the drawn one (half the kerf, negative) and the displacement of
-each piece. The true scale follows from the scanner's resolution, a bar, or the sheet's pins.
+All edges together determine, by robust least squares, the map from the cut file to the picture, the
+offset of the film's edge outside the drawn edge (half the kerf, negative) and the displacement of
+each piece. The true scale comes from the scanner's resolution, a bar, or the sheet's pins.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ LOOSE, TIGHT = 0.3, 0.004  # displacement of pieces, at the first guess and at l
 
 @dataclass(frozen=True)
 class Samples:
-    """Places on the drawn edges: ``points`` and outward ``normals`` of the film (n, 2), mm.
+    """Points on the drawn edges: ``points`` and outward ``normals`` of the film (n, 2), mm.
 
-    ``curvatures``, 1/mm: positive where the film's edge bulges outward. ``contours`` and ``pieces``
+    ``curvatures``, 1/mm, are positive where the film's edge is convex. ``contours`` and ``pieces``
     are the numbers of each sample's contour and piece.
     """
 
@@ -60,7 +60,7 @@ class Samples:
     pieces: NDArray[np.int64]
 
     def middles(self, count: int) -> PointArray:
-        """Return the mean place of the samples of each of ``count`` pieces, (count, 2) mm."""
+        """Return the mean position of the samples of each of ``count`` pieces, (count, 2) mm."""
         sums = [np.bincount(self.pieces, each, count) for each in self.points.T]
         return np.column_stack(sums) / self.numbers(count)[:, None]
 
@@ -69,7 +69,7 @@ class Samples:
         return np.maximum(np.bincount(self.pieces, minlength=count), 1.0)
 
     def moved(self, displacements: FloatArray) -> Samples:
-        """Return the samples at displaced pieces: mm along x and y, radians about the middle."""
+        """Return the samples on displaced pieces: mm along x and y, radians about the middle."""
         dx, dy, turns = displacements[self.pieces].T
         middles = self.middles(len(displacements))[self.pieces] @ (1, 1j)
         spin = np.exp(1j * turns)
@@ -127,10 +127,10 @@ def _is_corner(before: Edge, after: Edge) -> bool:
 def crossings(
     picture: ScanPicture, warp: Warp, samples: Samples, reach: float, expected: float = 0.0
 ) -> tuple[FloatArray, float]:
-    """Return the distance of the film's edge outside each drawn edge, mm; NaN if none is visible.
+    """Return the distance of the film's edge outside each drawn edge, mm (NaN if none is visible),
+    and the deviation of the picture's blur, mm.
 
-    Of several edges along a normal, the one nearest to ``expected`` mm outside. And the deviation
-    of the picture's blur, mm.
+    Of several edges along a normal, the one nearest to ``expected`` mm outside is used.
     """
     from scipy.ndimage import gaussian_filter1d, map_coordinates, median_filter
 
@@ -166,7 +166,7 @@ def crossings(
 def _passing(
     share: FloatArray, level: float, offsets: FloatArray, expected: FloatArray | float
 ) -> FloatArray:
-    """Return the offset where each row falls through a level, nearest to ``expected``, or NaN."""
+    """The offset at which each row falls through a level, nearest to ``expected``, or NaN."""
     falls = (share[:, :-1] >= level) & (share[:, 1:] < level)
     with np.errstate(divide="ignore", invalid="ignore"):
         part = (share[:, :-1] - level) / (share[:, :-1] - share[:, 1:])
@@ -200,12 +200,12 @@ class EdgeFit:
 
     @property
     def residuals(self) -> FloatArray:
-        """Residuals of the edges after the common offset, mm."""
+        """The residuals of the edges after the common offset, mm."""
         return self.outside - self.offset
 
 
 def fitted(scan: Scan, location: Location) -> EdgeFit:
-    """Return the fit of the edges in a picture with a roughly known location."""
+    """Return the fit of the edges in a picture with an approximately known location."""
     sheet = scan.sheet
     samples = samples_of([place.region for place in sheet.places], location.is_skeleton)
     degree = 3 if scan.is_camera and len(sheet.places) >= 6 else 1
@@ -226,7 +226,7 @@ def fitted(scan: Scan, location: Location) -> EdgeFit:
 def _solved(
     laid: Samples, warp: Warp, outside: FloatArray, displacements: FloatArray, looseness: float
 ) -> EdgeFit:
-    """Solve for the map, the offset and all displacements at once, by Tukey's weights."""
+    """Solve for the map, the offset and all displacements at once, with Tukey's weights."""
     matrix, arms = _matrix(laid, warp, len(displacements))
     first = matrix.shape[1] - displacements.size
     # All displacements are expected to be about equally small; a turn counts by the edge's motion.
@@ -265,9 +265,8 @@ def _solved(
 
 
 def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return the outward motion of each sample by the unknowns: offset, map, displacements.
-
-    And the mean square of the motion by a turn of each of ``count`` pieces, mm2.
+    """Return the outward motion of each sample per unknown (offset, map, displacements), and the
+    mean square of the motion by a rotation of each of ``count`` pieces, mm2.
     """
     arm = laid.points - laid.middles(count)[laid.pieces]
     turn = arm[:, 0] * laid.normals[:, 1] - arm[:, 1] * laid.normals[:, 0]
@@ -281,10 +280,11 @@ def _matrix(laid: Samples, warp: Warp, count: int) -> tuple[FloatArray, FloatArr
 
 
 def _of_offset(influence: FloatArray, pull: FloatArray, laid: Samples) -> tuple[float, int]:
-    """Return the offset's standard uncertainty from the scatter between pieces, and its degrees.
+    """Return the offset's standard uncertainty from the scatter between pieces, and its degrees of
+    freedom.
 
     Errors within a piece are correlated and its displacement is one draw, so pieces are the
-    clusters, or contours if pieces are few (cluster-robust sandwich estimate).
+    clusters, or contours if there are few pieces (cluster-robust sandwich estimate).
     """
     if len(pull) < FEW:
         by_cluster: NDArray[Any] = np.bincount(laid.contours, influence)
@@ -307,7 +307,7 @@ SEARCH = 0.45  # search range around a drawn edge, mm
 
 @dataclass(frozen=True)
 class Scale:
-    """True over drawn lengths along x and y, and the reference."""
+    """The ratio of true to drawn lengths along x and y, and its reference."""
 
     x: float
     y: float
@@ -315,7 +315,7 @@ class Scale:
 
 
 def scale_of(scan: Scan, fit: EdgeFit) -> Scale:
-    """Return the film's scale by the reference. Raises DesignError if that is not visible."""
+    """Return the film's scale from the reference. Raises DesignError if that is not visible."""
     reference = scan.reference
     if reference.bar is not None:
         scale = _by_bar(scan, fit, reference.bar)
@@ -348,12 +348,12 @@ def _by_bar(scan: Scan, fit: EdgeFit, length: float) -> float:
             ends = [along[(s * towards > 0.9) & np.isfinite(outside)] for s in (1, -1)]
             if min(map(len, ends)) == 0:
                 raise DesignError(
-                    "--bar: its ends are not seen; lay it on the paper with square ends"
+                    "--bar: its ends are not visible; lay it on the paper with square ends"
                 )
             return length / float(np.median(ends[0]) - np.median(ends[1]))
     raise DesignError(
-        f"--bar is {length:g} mm, and no bar about that long lies beside the parts; lay a straight "
-        "bar with square ends on the paper, clear of the film and the picture's border"
+        f"--bar is {length:g} mm, and no bar of about that length lies beside the parts; lay a "
+        "straight bar with square ends on the paper, clear of the film and the picture's border"
     )
 
 
@@ -361,7 +361,7 @@ def _by_pins(scan: Scan, fit: EdgeFit) -> float:
     pins = scan.sheet.pins
     if len(pins) < LEAST_PINS:
         raise DesignError(
-            f"--pins needs {LEAST_PINS} pins of {scan.sheet.name} or more, and it has "
+            f"--pins needs {LEAST_PINS} pins of {scan.sheet.name} or more, but it has "
             f"{len(pins)}; give --dpi or --bar"
         )
     drawn = np.array([(x, y) for x, y, _ in pins])
@@ -370,7 +370,7 @@ def _by_pins(scan: Scan, fit: EdgeFit) -> float:
 
 
 def _pin(picture: ScanPicture, fit: EdgeFit, pin: tuple[float, float, float]) -> PointArray:
-    """Return the middle of a pin, mm of the cut file."""
+    """Return the centre of a pin, in mm of the cut file."""
     x, y, diameter = pin
     samples = samples_of([disc((x, y), diameter / 2)], False)
     for _ in range(3):
@@ -378,7 +378,7 @@ def _pin(picture: ScanPicture, fit: EdgeFit, pin: tuple[float, float, float]) ->
         is_measured = np.isfinite(outside)
         if is_measured.mean() < 0.8:
             raise DesignError(
-                f"the pin at x {x:g}, y {y:g} mm is not seen; give --dpi or --bar, or a picture "
+                f"the pin at x {x:g}, y {y:g} mm is not visible; give --dpi or --bar, or a picture "
                 "with all pins"
             )
         columns = np.column_stack([samples.normals[is_measured], np.ones(is_measured.sum())])

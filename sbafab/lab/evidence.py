@@ -1,4 +1,4 @@
-"""Use a lab's records as evidence: curves over all actuators of one design."""
+"""A lab's records as evidence: curves over all actuators of one design."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def from_lab_records(lab: Lab) -> Evidence:
     """Return a curve for each design and recorded quantity, with one value per actuator.
 
     Records have no measurement error, so a curve's error is the scatter of its actuators. A
-    repaired actuator counts by its first attempt. Raises DesignError if no number is recorded.
+    repaired actuator counts with its first attempt. Raises DesignError if no number is recorded.
     """
     records, _, builds = lab.contents()
     by_design: dict[str, list[Built]] = defaultdict(list)
@@ -53,8 +53,7 @@ def from_lab_records(lab: Lab) -> Evidence:
             curves.append(curve.model_copy(update={"id": name}))
     if not curves:
         raise DesignError(
-            f"{lab.path} has no record with any of {', '.join(RECORDED)}; record one, such as "
-            "--stroke 16.8"
+            f"{lab.path} has no record of {', '.join(RECORDED)}; record one, such as --stroke 16.8"
         )
     citation = f"build records in {lab.path.name}"
     return Evidence(id=_id(lab.path.stem), citation=citation, curves=tuple(curves))

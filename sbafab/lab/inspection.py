@@ -1,7 +1,7 @@
 """Inspect a picture of a cut sheet against its cut file.
 
-The sheet is located, its edges are measured and its pieces named; the result is written as JSON, as
-a table of sizes that ``sbafab kerf`` reads, and as a picture with the deviations.
+The sheet is located, its edges are measured and its pieces identified; the result is written as
+JSON, as a table of sizes for ``sbafab kerf``, and as a picture with the deviations.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ HARMLESS = ("sound", "moved", "turned")
 class Inspection:
     """Measurements of a cut sheet from a picture.
 
-    ``kerf`` mm, twice the distance of the film's edge inside the beam's path. ``rms`` and
+    ``kerf`` is twice the distance of the film's edge inside the beam's path, mm. ``rms`` and
     ``within_95`` mm: deviations of edges from the drawn ones apart from kerf, scale and the pieces'
     displacements. ``pixel`` and ``blur`` mm in the picture. Raises DesignError if the picture does
     not show the sheet, or too little of it.
@@ -48,9 +48,8 @@ class Inspection:
         self.edges = int(weighted.sum())
         if self.edges < FEWEST:
             raise DesignError(
-                f"{scan.picture.path.name} shows {self.edges} places on edges of "
-                f"{scan.sheet.name}, and {FEWEST} are needed; scan at a higher resolution, or more "
-                "of the sheet"
+                f"{scan.picture.path.name} shows {self.edges} edge points of {scan.sheet.name}, "
+                f"but {FEWEST} are needed; scan at a higher resolution, or more of the sheet"
             )
         self.scale = scale_of(scan, self.fit)
         self.pixel = 1 / self.fit.warp.pixels_per_mm
@@ -62,12 +61,12 @@ class Inspection:
 
     @property
     def amiss(self) -> list[PieceFinding]:
-        """The places that do not hold their piece as drawn."""
+        """The places without their piece as drawn."""
         return [piece for piece in self.pieces if piece.verdict != "sound"]
 
     @property
     def failed(self) -> bool:
-        """True if a piece is missing, wrong, or too poorly visible to tell."""
+        """True if a piece is missing, wrong, or not visible enough to tell."""
         return any(piece.verdict not in HARMLESS for piece in self.pieces)
 
 
@@ -110,7 +109,7 @@ MOST_NOTE = 400  # most characters of a note in a lab's file
 
 
 def history(inspection: Inspection) -> dict[str, Any]:
-    """Return an entry of a device's history, as ``sbafab record --history`` reads it."""
+    """Return an entry of a device's history, in the format of ``sbafab record --history``."""
     sound = len(inspection.pieces) - len(inspection.amiss)
     picture = inspection.picture
     note = (
@@ -178,7 +177,7 @@ UNSEEN, AMISS = "#ff00ff", "#e6007e"
 
 
 def drawing(inspection: Inspection) -> str:
-    """Return an SVG: the picture, its edges coloured by deviation, faulty pieces named."""
+    """Return an SVG: the picture, with its edges coloured by deviation and faulty pieces named."""
     sheet, picture, warp = inspection.sheet, inspection.picture, inspection.fit.warp
     rows, columns = picture.pixels.shape
     factor = PAGE / max(rows, columns)

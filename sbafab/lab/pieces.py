@@ -48,9 +48,9 @@ HOLE_PLACE = 0.6  # largest distance between a hole and its place, mm
 class PieceFinding:
     """The finding for a place, x and y mm of the sheet: ``name`` is the piece drawn there.
 
-    ``message`` is the finding as text; ``shift`` mm and ``turn`` degrees from the place, None if no
-    piece was recognised; ``rms`` and ``largest`` mm: deviations of its edges from the drawn ones,
-    apart from shift, turn and the common offset.
+    ``message`` is the finding as text; ``shift`` mm and ``turn`` degrees are measured from the
+    place, None if no piece was recognised; ``rms`` and ``largest`` mm are deviations of its edges
+    from the drawn ones, apart from shift, rotation and the common offset.
     """
 
     name: str
@@ -66,7 +66,7 @@ class PieceFinding:
 
 class Match(NamedTuple):
     """A shape fitted to edges: degrees counter-clockwise and mm from the place, after mirroring if
-    it is mirrored.
+    mirrored.
 
     ``share`` of its edges lies on measured ones; ``misfit`` mm is the 95th percentile of distances.
     """
@@ -244,10 +244,10 @@ class _Judge:
         blob: shapely.Polygon | None = None,
     ) -> Iterator[Match]:
         """Yield the shape, unmirrored and mirrored, fitted to the edges of a blob, or to the edges
-        around its place that others partly cover.
+        around its place if others partly cover it.
 
-        Centroids of a blob and its shape agree at any turn; a piece that others cover in part is
-        tried in its place.
+        Centroids of a blob and its shape agree at any rotation; a partly covered piece is tried in
+        its place.
         """
         from scipy.spatial import cKDTree
 
@@ -294,9 +294,9 @@ def _recognised(
     after: str,
     otherwise: tuple[PieceVerdict, str],
 ) -> PieceFinding:
-    """Return the finding for a piece that was recognised; ``otherwise`` if it is the place's own
-    and less than ``least`` mm off. ``after_other`` and ``after`` end messages on another piece and
-    on the place's own.
+    """Return the finding for a recognised piece; ``otherwise`` if it is the expected piece and less
+    than ``least`` mm off. ``after_other`` and ``after`` end messages on another piece and on the
+    expected one.
     """
     if match.name != place.name:
         over = ", turned over," if match.is_mirrored else ""
@@ -311,7 +311,7 @@ def _recognised(
 def _displaced(
     shift: float, turn: float, least: float, after: str = ""
 ) -> tuple[PieceVerdict, str] | None:
-    """Return verdict and message for a piece that is turned, or ``least`` mm or more off."""
+    """Return verdict and message for a piece that is rotated, or at least ``least`` mm off."""
     if abs(turn) > TURNED:
         return "turned", f"is turned by {turn:.0f} degrees{after}"
     if shift > least:
@@ -322,8 +322,8 @@ def _displaced(
 def _turns(
     tree: Any, arms: Complexes, reach: float, anchor: complex, aim: complex
 ) -> list[complex]:
-    """Return the three likeliest turns about an anchor that lies on ``aim``; of equally good ones
-    the smallest first.
+    """Return the three likeliest rotations about an anchor that maps to ``aim``; the smallest first
+    if equal.
     """
     angles = np.deg2rad(np.arange(-180, 180, ANGLE_STEP))
     spins = np.exp(1j * angles)
@@ -337,7 +337,7 @@ def _turns(
 def _aligned(
     tree: Any, edges: Complexes, arms: Complexes, guess: tuple[complex, complex], reach: float
 ) -> tuple[complex, complex]:
-    """Return turn and shift from points to their nearest edges within ``reach`` mm, by turns."""
+    """Rotation and shift from points to their nearest edges within ``reach`` mm, by rotation."""
     spin, shift = guess
     for _ in range(12):
         distance, nearest = tree.query(xy(arms * spin + shift))
@@ -369,7 +369,7 @@ def _points(ring: shapely.LinearRing) -> Complexes:
 
 
 def _inner(blob: shapely.Polygon) -> list[complex]:
-    """Return the middles of a blob's holes."""
+    """Return the centres of a blob's holes."""
     return [complex(_points(hole).mean()) for hole in blob.interiors]
 
 
@@ -379,7 +379,7 @@ def _holes(piece: Region, least: float = SMALLEST) -> list[Complexes]:
 
 
 def _apart(middles: Sequence[complex], there: Sequence[complex]) -> list[complex]:
-    """Return the middles of holes that are far from all others."""
+    """Return the centres of holes that are far from all others."""
     return [m for m in middles if all(abs(m - middle) > HOLE_PLACE for middle in there)]
 
 

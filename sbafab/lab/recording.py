@@ -79,7 +79,7 @@ def record_sheet(built: Design | Assembled) -> list[RecordTable]:
 def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]:
     """Return one history entry per serial of ``values``, by column.
 
-    Serials are a list, or a text with commas between them. Raises DesignError.
+    Serials are a list, or comma-separated text. Raises DesignError.
     """
     serials = values.get("serial") or ""
     if not isinstance(serials, list | tuple):
@@ -93,7 +93,7 @@ def entries_of(values: Mapping[str, Any], where: str = "") -> list[HistoryEntry]
 def read_batch(path: Path) -> list[Record]:
     """Return a result for each row of a batch's filled-in table.
 
-    Its columns are a subset of a Record's. Several errors share one cell, separated by blanks.
+    Its columns are a subset of a Record's. Several errors share one cell, separated by spaces.
     Raises DesignError with the line.
     """
     records = [row_of(Record, row, where) for where, row in table_rows(path)]
@@ -109,8 +109,8 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
     """Return the history entries of a file, with ``defaults`` for values that it omits.
 
     A CSV file has one row per entry; its columns are a subset of a HistoryEntry's. TOML and JSON
-    have a list ``entry``, and beside it values shared by all entries. Photographs are looked up
-    beside the file. Raises DesignError with the line or the entry.
+    have a list ``entry`` and values shared by all entries. Paths of photographs are relative to the
+    file. Raises DesignError with the line or the entry.
     """
     rows = table_rows(path) if path.suffix.lower() == ".csv" else _entry_tables(path)
     entries: list[HistoryEntry] = []
@@ -120,7 +120,7 @@ def read_history(path: Path, defaults: Mapping[str, Any]) -> list[HistoryEntry]:
             values["photograph"] = str(path.parent / str(values["photograph"]))
         entries += entries_of(values, where)
     if not entries:
-        raise DesignError(f"{path} holds no entry; fill in a row")
+        raise DesignError(f"{path} has no entry; fill in a row")
     return entries
 
 
@@ -139,7 +139,7 @@ def _entry_tables(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
         raise DesignError(f"{path} cannot be read: {error}") from None
     rows = table.get("entry") if isinstance(table, dict) else None
     if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
-        raise DesignError(f"{path} needs a list of tables called entry, one for each entry")
+        raise DesignError(f"{path} needs a list of tables named entry, one for each entry")
     common = {name: value for name, value in table.items() if name != "entry"}
     for number, row in enumerate(rows, start=1):
         yield f"{path}, entry {number}", {**common, **row}
@@ -148,7 +148,7 @@ def _entry_tables(path: Path) -> Iterator[tuple[str, Mapping[str, Any]]]:
 def matching(
     text: str, serial: str, stored: Sequence[Row], builds: Mapping[str, RecordedDesign]
 ) -> list[Row]:
-    """Return the rows of the design whose hash (eight digits or more of it) the text holds.
+    """Return the rows of the design with the hash (at least eight digits) in the text.
 
     Rows of other designs of the same actuator are included. Otherwise the text is a serial, a
     design's name or a row's number; ``serial``, if given, filters these rows.

@@ -68,7 +68,7 @@ def _number(value: object) -> object:
 
 
 def _several(value: object) -> object:
-    """Return one number, or a text with blanks between several, as a list."""
+    """Return one number, or space-separated numbers, as a list."""
     if isinstance(value, str):
         return value.split()
     return list(value) if isinstance(value, Iterable) else [value]
@@ -86,8 +86,8 @@ class LabRow(BaseModel):
     """A row about the device ``serial``; fields without a value are empty.
 
     The file adds the row's number ``id``, the time ``recorded`` (UTC) and the hash of the design. A
-    row replaces the one that it ``corrects``. ``attempt`` is 1, plus one for each time that the
-    device was repaired and retested.
+    row replaces the one that it ``corrects``. ``attempt`` is 1, plus one for each repair and retest
+    of the device.
     """
 
     model_config = ConfigDict(
@@ -108,12 +108,12 @@ class LabRow(BaseModel):
 
     @property
     def number(self) -> str:
-        """The number as it is shown and typed: 3 of a result, e3 of a history entry."""
+        """The number as displayed and typed: 3 for a result, e3 for a history entry."""
         return f"{self.SIGN}{self.id}"
 
     @property
     def stated(self) -> dict[str, Any]:
-        """The values by column, without empty ones and those added by the file."""
+        """The values by column, without empty ones and those that the file adds."""
         return self.given(columns(type(self)))
 
     @property
@@ -134,7 +134,7 @@ class LabRow(BaseModel):
 
     @abstractmethod
     def _problems(self) -> Iterator[str]:
-        """Yield sentences on fields that need another field."""
+        """Yield sentences about fields that need another field."""
 
     @model_validator(mode="after")
     def _whole(self) -> Self:
@@ -144,8 +144,8 @@ class LabRow(BaseModel):
 
 
 class Record(LabRow):
-    """A result of an actuator: "pass" or "fail" of its ``leak`` test, the ``operator`` who built it
-    the ``kit``, and the measured values; field names include their units.
+    """A result of an actuator: "pass" or "fail" of its ``leak`` test, its ``operator`` and ``kit``,
+    and the measured values; field names include their units.
     """
 
     NOUN: ClassVar[str] = "record"
@@ -166,12 +166,12 @@ class Record(LabRow):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Values measured once, by column, each in the unit of its name."""
+        """The values measured once, by column, each in the unit in its name."""
         return self.given(NUMBERS)
 
     @property
     def errors(self) -> dict[str, tuple[float, ...]]:
-        """The measured errors, by column, each in the unit of its name."""
+        """The measured errors, by column, each in the unit in its name."""
         return self.given(ERRORS)
 
     def _problems(self) -> Iterator[str]:
@@ -221,14 +221,12 @@ class HistoryEntry(LabRow):
 
     @property
     def readings(self) -> dict[str, float]:
-        """The numbers that were read, by column, each in the unit of its name."""
+        """The readings, by column, each in the unit in its name."""
         return self.given(READINGS)
 
     @property
     def is_expired(self) -> bool:
-        """True if the lot had expired on the day of work, or on the day of recording if none is
-        given.
-        """
+        """True if the lot had expired on the day of work, or of recording if none is given."""
         return bool(self.expires) and self.expires < (self.date or self.recorded[:10])
 
     def _problems(self) -> Iterator[str]:
@@ -343,7 +341,7 @@ def columns(kind: type[LabRow]) -> tuple[str, ...]:
 
 
 def row_of(kind: type[Row], values: Mapping[str, Any], where: str = "") -> Row:
-    """Return a row of values by column; numbers may be texts, several errors a list or a text.
+    """Return a row of values by column; numbers may be text, several errors a list or text.
 
     Raises DesignError with one sentence that begins with ``where``.
     """
@@ -352,7 +350,9 @@ def row_of(kind: type[Row], values: Mapping[str, Any], where: str = "") -> Row:
     place = f"{where}: " if where else ""
     for name in stated:
         if name not in (*columns(kind), "withdrawn"):
-            raise DesignError(f"{place}{name[:40]!r} is none of {', '.join(columns(kind))}")
+            raise DesignError(
+                f"{place}{name[:40]!r} is not a column; use {', '.join(columns(kind))}"
+            )
     try:
         return checked(kind, stated, {}, place)
     except DesignError as error:

@@ -1,6 +1,6 @@
 """Locate a cut sheet in a picture: the map from millimetres of the cut file to pixels.
 
-Outlines are matched by position and area: each pair gives a similarity; the one with the most
+Outlines are matched by position and area: each pair defines a similarity; the one with the most
 matching outlines is refined to an affine map (scanner) or a homography (camera).
 """
 
@@ -43,7 +43,7 @@ SMALLEST = 0.2  # least area of a hole to search, mm2
 class Warp:
     """A map from mm of the cut file to pixels: a homography after a small polynomial one.
 
-    ``base`` (3, 3); ``coefficients`` (k, 2) in mm are of the monomials up to ``degree`` of the
+    ``base`` is (3, 3); ``coefficients`` (k, 2) in mm multiply the monomials up to ``degree`` of the
     position relative to ``centre``, in units of ``size``, mm.
     """
 
@@ -65,17 +65,17 @@ class Warp:
 
     @property
     def axes(self) -> NDArray[np.float64]:
-        """The pixels from the centre to a millimetre along x, and along y, (2, 2)."""
+        """The pixels per millimetre at the centre along x, and along y, (2, 2)."""
         at = self(np.array([(0.0, 0.0), (1e-3, 0.0), (0.0, 1e-3)]) + self.centre)
         return np.asarray((at[1:] - at[0]) * 1e3)
 
     @property
     def pixels_per_mm(self) -> float:
-        """The pixels of a millimetre at the centre."""
+        """The pixels per millimetre at the centre."""
         return math.sqrt(abs(float(np.linalg.det(self.axes))))
 
     def inverse(self, pixels: PointArray) -> PointArray:
-        """Return the points in mm of pixels."""
+        """Return the points in mm at pixels."""
         aim = projected(np.linalg.inv(self.base), pixels)
         points = aim
         for _ in range(8):
@@ -91,8 +91,8 @@ def projected(matrix: NDArray[Any], points: PointArray) -> PointArray:
 
 @dataclass(frozen=True)
 class Location:
-    """``warp`` from the sheet to the picture, the picture's content, and the share of the drawn
-    outlines that match: ``matched`` of ``targets``.
+    """The map ``warp`` from the sheet to the picture, the picture's content, and ``matched`` of
+    ``targets``, the number of drawn outlines with a match.
 
     ``from_below``: True if the sheet appears mirrored.
     """
@@ -130,8 +130,8 @@ def locate(scan: Scan) -> Location:
         shown = "none" if best is None else f"{best.matched} of {best.targets}"
         raise DesignError(
             f"the picture does not show {scan.sheet.name}: {shown} of its outlines match; check "
-            f"--sheet{', --dpi' if scan.reference.dpi else ''} and --paper, and that the waste is "
-            "lifted off, or the pieces are"
+            f"--sheet{(', --dpi' if scan.reference.dpi else '')} and --paper, and that either "
+            "the waste or the pieces are removed"
         )
     return best
 
@@ -162,7 +162,7 @@ class _Pose(NamedTuple):
 
 
 class _Finder:
-    """Matches of the outlines of a picture with the contours that it shows of a sheet."""
+    """Matches between the outlines of a picture and the visible contours of a sheet."""
 
     def __init__(self, scan: Scan, content: Content) -> None:
         self.scan, self.content, self.scale = scan, content, scan.reference.pixels_per_mm
@@ -217,7 +217,7 @@ class _Finder:
         yield from poses[:MOST_POSES]
 
     def _pairs(self) -> list[tuple[int, int]]:
-        """Return pairs of large contours far apart."""
+        """Return pairs of large contours that are far apart."""
         large = np.argsort(-self.areas)[: 3 * ANCHORS].tolist()
         if len(large) <= FEW:
             return list(combinations(large, 2))
@@ -266,7 +266,7 @@ class _Finder:
         return np.where(distance.min(axis=1) < reach * per_mm, distance.argmin(axis=1), -1)
 
     def _refined(self, pose: _Pose) -> Location:
-        """Return the location by an affine map or a homography of matched centroids."""
+        """Return the location from an affine map or a homography of matched centroids."""
         low_x, low_y, high_x, high_y = self.scan.sheet.bounds
         centre = (low_x + high_x) / 2, (low_y + high_y) / 2
         size = max(high_x - low_x, high_y - low_y) / 2
@@ -282,7 +282,7 @@ class _Finder:
         return Location(warp, self.content, pose.from_below, matched, len(self.places))
 
     def _fitted(self, points: PointArray, pixels: PointArray) -> NDArray[np.float64] | None:
-        """Return the map of points to pixels by least squares; None for points along a line."""
+        """Return the map of points to pixels by least squares; None for collinear points."""
         from skimage import transform
 
         if len(points) < 3:

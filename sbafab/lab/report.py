@@ -1,7 +1,7 @@
-"""Evaluation of a lab's records: success, and measured against predicted.
+"""Evaluation of a lab's records: success rates, and measured against predicted values.
 
-Designs that build the same actuator (``RecordedDesign.actuator``) count as one. A repaired and
-retested actuator counts by its first attempt.
+Designs of the same actuator (``RecordedDesign.actuator``) count as one. A repaired and retested
+actuator counts with its first attempt.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ UNSAID = "not said"
 @dataclass(frozen=True)
 class Built:
     """A built actuator: its ``records`` by attempt, the ``build`` of the first record, and the name
-    of that ``design`` in the report.
+    of its ``design`` in the report.
     """
 
     design: str
@@ -43,7 +43,7 @@ class Built:
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Measured values, from the first attempt that has them."""
+        """The measured values, from the first attempt with any."""
         return {k: v for record in reversed(self.records) for k, v in record.numbers.items()}
 
     @property
@@ -59,7 +59,8 @@ class Built:
 
 @dataclass(frozen=True)
 class Success:
-    """Actuators of a group that passed the leak test at the first attempt, of those tested.
+    """The number of actuators in a group that passed the leak test at the first attempt, and the
+    number tested.
 
     ``passed_later`` counts those that passed at a later attempt. ``promised`` is the share of good
     builds by rule registration-yield; None for a group of several designs.
@@ -74,11 +75,11 @@ class Success:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The measured mean of a quantity of a design against its prediction, all in ``unit``.
+    """The measured mean of a quantity of a design compared with its prediction, all in ``unit``.
 
     ``mean`` is over ``count`` actuators. ``low`` and ``high``, the ends of its 95 % interval in
-    that unit, are None for a single measurement; ``predicted`` and ``ratio``, measured over
-    predicted, are None without a model.
+    that unit, are None for one measurement; ``predicted`` and ``ratio``, measured over predicted,
+    are None without a model.
     """
 
     design: str
@@ -120,7 +121,7 @@ class SuccessDocument(Document):
 
 
 class ReportDocument(Document, schema="sbafab/report@1"):
-    """A report; every value is a share or has its unit beside it."""
+    """A report; every value is a share or has an adjacent unit."""
 
     records: int
     actuators: int = attribute("items")
@@ -129,7 +130,7 @@ class ReportDocument(Document, schema="sbafab/report@1"):
 
 
 def report(records: Sequence[Record], builds: Mapping[str, RecordedDesign]) -> Report:
-    """Evaluate the records; every design recorded must be among ``builds``."""
+    """Evaluate the records; ``builds`` must include every recorded design."""
     actuators = items(records, builds)
     success = tuple(_success([item for item in actuators if item.first("leak")]))
     return Report(len(records), len(actuators), success, tuple(_comparisons(actuators, builds)))
@@ -215,8 +216,8 @@ MOST_DRAWN = 400
 def success_svg(records: Sequence[Record], builds: Mapping[str, RecordedDesign]) -> str:
     """Return the chart of success over the actuators, in the order of their first records.
 
-    It shows the cumulative share with its 95 % interval, and the share of the last RECENT. Raises
-    DesignError without a leak test.
+    It shows the cumulative share with its 95 % interval, and the share of the last RECENT
+    actuators. Raises DesignError without a leak test.
     """
     passed = [item.passed for item in items(records, builds) if item.first("leak")]
     if not passed:

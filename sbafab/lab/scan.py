@@ -1,4 +1,4 @@
-"""A picture of film on paper with its outlines, and the cut file that it is compared with.
+"""A picture of film on paper with its outlines, and the cut file for comparison.
 
 Pieces of the cut file have the names of their patterns.
 """
@@ -40,7 +40,7 @@ FLATBED_DPI = range(150, 9601)  # credible resolutions of a scan: cameras write 
 
 @dataclass(frozen=True)
 class ScanPicture:
-    """``pixels`` of a file with its hash; ``dpi`` along x and y as stated in the file, or None."""
+    """The ``pixels`` of a file with its hash; ``dpi`` along x and y as the file states, or None."""
 
     path: Path
     pixels: Pixels
@@ -55,7 +55,7 @@ def read_picture(path: Path) -> ScanPicture:
     if not path.is_file():
         raise DesignError(f"{path} is not a file; give the picture of the cut sheet")
     if path.stat().st_size > MOST_BYTES:
-        raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in grey")
+        raise DesignError(f"{path} is larger than {MOST_BYTES:,} bytes; scan in greyscale")
     try:
         with Image.open(path) as image:
             columns, rows = image.size
@@ -81,7 +81,7 @@ def read_picture(path: Path) -> ScanPicture:
 
 
 def _grey(image: Any) -> Pixels:
-    """Return grey levels of 0 to 255, also for a picture of 16 bits."""
+    """Return grey levels from 0 to 255, also for a 16-bit picture."""
     if image.mode.startswith(("I", "F")):
         levels = np.asarray(image, dtype=np.float32)
         return levels / max(float(levels.max()), 1.0) * 255
@@ -98,7 +98,7 @@ def _resolution(stated: Any) -> tuple[float, float] | None:
 
 
 class PictureOutline(NamedTuple):
-    """A closed outline, x and y in pixels; its inside is lighter than its surroundings, or not."""
+    """A closed outline, x and y in pixels, and whether its inside is lighter than the outside."""
 
     polygon: shapely.Polygon
     is_light: bool
@@ -107,8 +107,8 @@ class PictureOutline(NamedTuple):
 def outlines(picture: ScanPicture) -> list[PictureOutline]:
     """Return regions that are lighter or darker than their surroundings, largest first.
 
-    They are found in the picture reduced to COARSE pixels, within a pixel of that. Raises
-    DesignError if nothing stands out.
+    They are detected in the picture reduced to COARSE pixels, to within one pixel. Raises
+    DesignError if there is no such region.
     """
     from skimage import measure
 
@@ -134,7 +134,7 @@ def _reduced(pixels: Pixels, factor: int) -> Pixels:
 
 
 def _level(reduced: Pixels, path: Path) -> Pixels:
-    """Return the threshold midway between film and paper, following uneven light."""
+    """Return the threshold midway between film and paper, adapted to uneven light."""
     from scipy.ndimage import gaussian_filter, map_coordinates
     from skimage import filters
 
@@ -148,7 +148,7 @@ def _level(reduced: Pixels, path: Path) -> Pixels:
         contrast = 0.0 if is_plain else np.median(sparse[is_light]) - np.median(sparse[~is_light])
         if contrast < LEAST_CONTRAST:
             raise DesignError(
-                f"{path}: film and paper differ by {contrast:.0f} of 255 grey levels, and "
+                f"{path}: film and paper differ by {contrast:.0f} of 255 grey levels, but "
                 f"{LEAST_CONTRAST:.0f} are needed; lay the film on black paper and scan again"
             )
         level = (_local_mean(sparse, is_light) + _local_mean(sparse, ~is_light)) / 2
@@ -186,11 +186,11 @@ class SheetShape:
 
 @dataclass(frozen=True)
 class DrawnSheet:
-    """Contours of a cut file as the beam runs, mm.
+    """Contours of a cut file along the beam's path, mm.
 
     ``places``: the pieces at their cut positions, named by their patterns. ``shapes``: every piece
-    of the folder, any of them may lie in a place. ``pins``: x, y and diameter of the pins of a
-    sheet. ``kerf`` is the file's kerf compensation.
+    of the folder, since any may lie in a place. ``pins``: x, y and diameter of the pins of a sheet.
+    ``kerf`` is the file's kerf compensation.
     """
 
     name: str
@@ -207,7 +207,7 @@ class DrawnSheet:
 
 
 def read_cut_sheet(source: Path, name: str | None) -> DrawnSheet:
-    """Return the sheet or layer ``name`` of an output folder, or a cut file given by its path.
+    """Return the sheet or layer ``name`` of an output folder, or a cut file at a path.
 
     Raises DesignError if the folder has no such file, OutputError if a file is corrupt.
     """
@@ -234,7 +234,7 @@ def _chosen(name: str | None, names: Sequence[str]) -> str:
         raise DesignError(f"--sheet is missing; name the cut file in the picture: {listed}")
     stem = Path(name).name.removesuffix(".dxf")
     if stem not in names:
-        raise DesignError(f"--sheet is {name[:60]!r}, which the folder has not; it has {listed}")
+        raise DesignError(f"--sheet {name[:60]!r} is not in the folder; use {listed}")
     return stem
 
 
@@ -269,7 +269,7 @@ def _sheet(
 ) -> DrawnSheet:
     drawing = read_profile(path)
     if not drawing.region.contours:
-        raise OutputError(f"{path.name} contains no parts; give a sheet or layer that has some")
+        raise OutputError(f"{path.name} contains no parts; give a sheet or layer with parts")
     named: list[SheetShape] = []
     unnamed: list[SheetShape] = []
     for piece in drawing.region.pieces:
@@ -284,7 +284,7 @@ def _sheet(
 
 
 def _is_congruent(piece: Region, shape: Region) -> bool:
-    """Return True if a piece is a shape shifted and turned by quarter turns."""
+    """Return True if a piece is a shape shifted and rotated by quarter turns."""
     if len(piece.contours) != len(shape.contours) or abs(piece.area - shape.area) > SAME_SIZE:
         return False
     lying = _centred(piece)
@@ -293,7 +293,7 @@ def _is_congruent(piece: Region, shape: Region) -> bool:
 
 
 def _centred(region: Region) -> shapely.MultiPolygon:
-    """Return a region with the middle of its box at the origin."""
+    """Return a region with the centre of its box at the origin."""
     low_x, low_y, high_x, high_y = region.bounds
     return region.moved(-(low_x + high_x) / 2, -(low_y + high_y) / 2).shapely()
 
@@ -306,7 +306,8 @@ MILLIMETRES = 25.4  # an inch, mm
 
 @dataclass(frozen=True)
 class Reference:
-    """``dpi`` along the picture's rows and columns; a ``bar`` of this length, mm; the ``pins``.
+    """A scale reference: ``dpi`` along rows and columns, a ``bar`` of this length (mm), or the
+    ``pins``.
 
     The first of bar, pins and dpi that is given is used; without any, the scale is 1.
     """
@@ -322,7 +323,7 @@ class Reference:
 
 @dataclass(frozen=True)
 class Scan:
-    """A picture of a sheet and how it was taken.
+    """A picture of a sheet and the way it was taken.
 
     ``is_camera``: with perspective. ``is_light``: film is lighter than its background.
     """

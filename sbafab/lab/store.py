@@ -1,7 +1,7 @@
-"""A lab's records in one SQLite file, written by any number of processes, and its photographs.
+"""A lab's records in one SQLite file, shared by any number of processes, and its photographs.
 
 A write is one transaction, and writers wait for each other. Rows are only added: a correction names
-the row it replaces, and no row is corrected twice.
+the row that it replaces, and no row is corrected twice.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Contents(NamedTuple):
         return [row for row in (*self.entries, *self.records) if isinstance(row, kind)]
 
     def of_device(self, sha256: str, serial: str) -> list[LabRow]:
-        """Return the standing rows of a device: of this design, and of others of one actuator."""
+        """Return the valid rows of a device: of this design, and of others of one actuator."""
         rows: list[LabRow] = [*standing(self.records), *standing(self.entries)]
         builds = self.builds
         return [
@@ -72,8 +72,8 @@ class Contents(NamedTuple):
 class Lab:
     """The records in the file ``path``, which the first record creates.
 
-    Methods raise DesignError for rows that contradict the records, and OutputError, with one
-    sentence, if the file is locked, unreadable, damaged, another program's or of another version.
+    Methods raise DesignError for rows that contradict the records, and OutputError if the file is
+    locked, unreadable, damaged, or written by another program or version.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class Lab:
         self.path, self.patience, self.clock = path, patience, clock
 
     def contents(self) -> Contents:
-        """Return all rows; a read-only file suffices."""
+        """Return all rows; a read-only file is sufficient."""
         if not self.path.is_file():
             raise OutputError(
                 f"{self.path} is not a file of records; record something first, or name the lab's "
@@ -104,7 +104,7 @@ class Lab:
         Photographs are copied into the folder beside the lab's file first.
         """
         if is_again and not self.path.exists():
-            raise OutputError(f"{self.path} does not exist, so no attempt came before this one")
+            raise OutputError(f"{self.path} does not exist, so there is no earlier attempt")
         rows = [with_photograph(self.path, row) for row in rows]
         with self._writing() as file:
             if build is not None:
@@ -115,8 +115,8 @@ class Lab:
             for serial, device in devices.items() if is_again else ():
                 if not device:
                     raise DesignError(
-                        f"serial {serial} has no record yet, so no attempt came before this one; "
-                        "leave out --again, or see: sbafab record --find"
+                        f"serial {serial} has no record yet, so there is no earlier attempt; "
+                        "omit --again, or see: sbafab record --find"
                     )
             attempts = {
                 serial: max((row.attempt for row in device), default=1) + is_again
@@ -146,8 +146,8 @@ class Lab:
             for row in stored.values():
                 if row.corrects == number:
                     raise DesignError(
-                        f"{kind.NOUN} {old.number} is corrected by {kind.NOUN} {row.number} "
-                        "already; correct that one"
+                        f"{kind.NOUN} {old.number} is already corrected by {kind.NOUN} "
+                        f"{row.number}; correct that one"
                     )
             row = with_photograph(self.path, row_of(kind, {**old.stated, **change}))
             more = {name: getattr(old, name) for name in ("design_sha256", "attempt")}
@@ -155,7 +155,7 @@ class Lab:
             return self._put(file, contents.of_device(row.design_sha256, row.serial), row)
 
     def _put(self, file: sqlite3.Connection, device: Sequence[LabRow], row: Row) -> Row:
-        """Add a row. Raises DesignError if it contradicts or repeats another one of its device."""
+        """Add a row. Raises DesignError if it contradicts or repeats another row of its device."""
         for stored in () if row.withdrawn else device:
             is_other = stored.attempt == row.attempt and stored.id != row.corrects
             if type(stored) is type(row) and is_other and (problem := row.conflict(stored)):
@@ -186,7 +186,7 @@ class Lab:
 
     @contextmanager
     def _writing(self) -> Iterator[sqlite3.Connection]:
-        """One transaction; the file is created if it is missing."""
+        """Run one transaction; create the file if it is missing."""
         with self._sqlite_errors(), closing(self._open()) as file:
             file.execute("BEGIN IMMEDIATE")
             try:
@@ -216,12 +216,13 @@ class Lab:
             return False
         if application != APPLICATION:
             raise OutputError(
-                f"{self.path} is a database of another program; name the lab's file with --lab"
+                f"{self.path} is another program's database; name the lab's file with --lab"
             )
         if version != VERSION:
             raise OutputError(
-                f"{self.path} was written by another sbafab (records of version {version}, this "
-                f"one reads {VERSION}); read it with that one, or name another file with --lab"
+                f"{self.path} was written by another sbafab (record format {version}; this "
+                f"version reads {VERSION}); read it with that version, or name another file with "
+                "--lab"
             )
         if file.execute("PRAGMA integrity_check(1)").fetchone() != ("ok",):
             raise OutputError(f"{self.path} {_REASONS['CORRUPT']}")
@@ -229,7 +230,7 @@ class Lab:
 
     @contextmanager
     def _sqlite_errors(self) -> Iterator[None]:
-        """Turn SQLite's errors into one sentence."""
+        """Convert SQLite's errors to one sentence."""
         try:
             yield
         except sqlite3.Error as error:
@@ -295,7 +296,7 @@ def store_photograph(lab: Path, content: bytes, where: str) -> str:
 
 
 def with_photograph(lab: Path, row: Row) -> Row:
-    """Return the row; its photograph, if it names one, is stored first. Raises DesignError."""
+    """Return the row after storing the photograph that it names, if any. Raises DesignError."""
     if not isinstance(row, HistoryEntry) or not row.photograph or _STORED.fullmatch(row.photograph):
         return row
     path = Path(row.photograph)

@@ -1,5 +1,5 @@
-"""Laminates: the model that everything else reads.
+"""Laminates: the model that all other rooms read.
 
-In: films and profiles of layers, bottom to top, with pins, inlets, seams and folds. Out: a
-``Laminate`` with its interfaces (contact, bond, unbonded), patterns, and the lay-up in press steps.
+Input: films and profiles of layers, bottom to top, with pins, inlets, seams and folds. Output: a
+``Laminate`` with its interfaces (contact, bond, unbonded), patterns, and lay-up in press steps.
 """

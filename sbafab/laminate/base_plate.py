@@ -1,7 +1,7 @@
 """The base plate's holes: their fit with dowel pins, and the machines' position errors.
 
-Deviations are from ISO 286-2 in mm (the standard was not opened; two suppliers' tables agree on m6,
-and H7 is grade IT7 above the nominal size).
+Deviations follow ISO 286-2, in mm (from two suppliers' tables, which agree on m6, not from the
+standard itself; H7 is grade IT7 above the nominal size).
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ LAPPED_PLAY = 0.002
 
 
 class HoleProcess(NamedTuple):
-    """A machine for the plate's holes.
+    """A machining process for the plate's holes.
 
     ``position`` is the largest position error of a hole, mm, in any direction; ``is_lapped``: each
-    hole is lapped to its own pin, else reamed H7.
+    hole is lapped to fit its pin, otherwise reamed H7.
     """
 
     words: str
@@ -42,8 +42,8 @@ promise for precise work (makerstage.com, cnc-tolerances-guide; olympusmachining
 
 
 def for_a_cnc_mill(design: str) -> str:
-    """Return the command that widens a design's bonds and overhangs for a plate from a CNC mill: to
-    nine good builds in ten, as in the paper.
+    """Return the command that widens a design's bonds and overhangs for a plate from a CNC mill, to
+    a yield of nine in ten, as in the paper.
     """
     return f"sbafab generate {design} --set registration.plate_made_by=cnc-mill --target-yield 0.9"
 
@@ -59,7 +59,7 @@ def hole_deviation(diameter: float) -> float:
 
 
 def most_play(diameter: float, machine: PlateMachine) -> float:
-    """Return the largest play of a pin in its hole of the plate, mm in diameter."""
+    """Return the largest play of a pin in its plate hole, mm in diameter."""
     if HOLE_PROCESSES[machine].is_lapped:
         return LAPPED_PLAY
     return round(hole_deviation(diameter) - pin_deviations(diameter)[0], 6)
@@ -68,7 +68,7 @@ def most_play(diameter: float, machine: PlateMachine) -> float:
 def pin_error(diameter: float, machine: PlateMachine) -> float:
     """Return the largest position error of a pin, mm: its hole's, plus half the play.
 
-    For a jig borer 0.003 + 0.002 / 2 is the paper's 0.004 for its dowel pins (Sec. 2).
+    A jig borer gives 0.003 + 0.002 / 2, the paper's 0.004 for its dowel pins (Sec. 2).
     """
     return round(HOLE_PROCESSES[machine].position + most_play(diameter, machine) / 2, 6)
 
@@ -76,7 +76,7 @@ def pin_error(diameter: float, machine: PlateMachine) -> float:
 def lone_pin_error(diameter: float, machine: PlateMachine) -> float:
     """Return the largest position error of a plate's only pin, mm, which moves all layers equally.
 
-    It is the play of a hole reamed H7: for pins up to 6 mm the paper's 0.004 again.
+    It is the play in a hole reamed H7: again the paper's 0.004 for pins up to 6 mm.
     """
     reamed = round((hole_deviation(diameter) - pin_deviations(diameter)[0]) / 2, 6)
     return min(pin_error(diameter, machine), reamed)

@@ -3,8 +3,8 @@ test, and a bound that working pressures must stay well below.
 
 The paper burst three actuators with pockets of 5 mm in its film of 0.038 mm, at 367 +- 18 kPa (Sec.
 4, 7). A thin film of radius r and thickness t under p has a stress of p r / 2 t in a sphere and p r
-/ t in a cylinder: a long pocket of width w becomes a cylinder of radius w / pi. Burst is scaled by
-film stress, as nothing else is known; lengths in mm, pressures in kPa.
+/ t in a cylinder: a long pocket of width w becomes a cylinder of radius w / pi. The burst pressure
+is scaled by film stress alone; lengths in mm, pressures in kPa.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ count as infinitely long cylinders."""
 class Burst(NamedTuple):
     """An estimate of the pressure in kPa at which the weakest pocket bursts.
 
-    ``radius`` mm is the radius of a sphere with the same film stress, ``thickness`` mm the thinner
-    of the pocket's films, ``centre`` the middle of its widest place, in the ``interface``.
+    ``radius`` is that of a sphere with the same film stress, mm; ``thickness`` that of the pocket's
+    thinner film, mm; ``centre`` the middle of its widest place in the ``interface``.
     """
 
     kpa: float
@@ -47,18 +47,18 @@ class Burst(NamedTuple):
 
 def burst(laminate: Laminate) -> Burst | None:
     """Return the burst estimate of a laminate, from its profiles; None without a pocket, or if a
-    film is of another product than the burst film.
+    film is not the product used in the burst tests.
     """
     return stored(laminate, "_burst", _burst)
 
 
 def refuse_beyond_burst(laminate: Laminate, kpa: float) -> None:
-    """Raise BeyondError for a pressure in kPa past the estimated burst pressure of a laminate."""
+    """Raise BeyondError if a pressure in kPa exceeds the estimated burst pressure of a laminate."""
     estimate = burst(laminate)
     if estimate is not None and kpa > estimate.kpa:
         raise BeyondError(
-            f"{kpa:g} kPa is past the estimated burst pressure, {estimate.kpa:.3g} kPa; give less "
-            "pressure, or take narrower pockets or thicker film",
+            f"{kpa:g} kPa exceeds the estimated burst pressure of {estimate.kpa:.3g} kPa; lower "
+            "the pressure, or use narrower pockets or thicker film",
             kpa / estimate.kpa - 1,
         )
 
@@ -91,7 +91,7 @@ def _pocket(interface: Interface) -> Burst | None:
 
 
 def _spanned(interface: Interface) -> Region:
-    """Return the unbonded film, with bores and vias, which the other film spans."""
+    """Return the unbonded film, with bores and vias, that the other film spans."""
     kept = [c for c in interface.unbonded.contours if not c.is_hole or _holds(c, interface.bond)]
     return Region(tuple(kept))
 

@@ -36,12 +36,12 @@ GAUGE = 0.1
 class Film:
     """A film as it comes off the roll.
 
-    ``thickness`` mm, ``density`` kg/m3 (None if unknown). ``softens_above`` is the temperature in C
-    at which the film bonds: the melting point of a TPE, None if unknown or if it ``stays_solid`` in
-    the press and bonds to a film that melts on it. ``limit`` is the highest temperature allowed, C.
+    ``thickness`` is in mm, ``density`` kg/m3 (None if unknown). ``softens_above`` is the bonding
+    temperature in C: the melting point of a TPE, None if unknown or if the film ``stays_solid`` in
+    the press and bonds to one that melts. ``limit`` is the highest temperature allowed, C.
     ``shade`` counts the films of a kind, for colours; ``warning`` is written into its cut files;
-    ``elastic`` are Young's modulus in MPa and Poisson's ratio, None if one of them is unknown.
-    ``faces`` are the materials of the upper and the lower face; None if both have the film's name.
+    ``elastic`` are Young's modulus in MPa and Poisson's ratio, None if either is unknown. ``faces``
+    are the materials of the upper and the lower face; None if both have the film's name.
     """
 
     material: Material
@@ -64,12 +64,12 @@ class Film:
 
     @property
     def said(self) -> str:
-        """Product and thickness in one text: "Stretchlon 200, 0.038 mm"."""
+        """The product and thickness as text: "Stretchlon 200, 0.038 mm"."""
         return film_name(self.product, self.thickness)
 
     @property
     def written(self) -> str:
-        """The material for the bench; another TPE than the paper's with its product."""
+        """The material for the traveller; a TPE other than the paper's with its product."""
         is_another = self.material == FIRST[0] and self.product != PAPER_PRODUCT
         return f"{self.material} ({self.product})" if is_another else self.material
 
@@ -84,8 +84,8 @@ class Film:
 
     @property
     def melts(self) -> bool:
-        """True if it melts through when a press bonds it; False for masks, for films that stay
-        solid, and for coated films, whose faces are of two materials.
+        """True if it melts completely when a press bonds it; False for masks, films that stay
+        solid, and coated films, whose faces are of two materials.
         """
         is_coated = self.faces is not None and self.faces[0] != self.faces[1]
         return not (self.is_mask or self.stays_solid or is_coated)
@@ -97,7 +97,7 @@ class Film:
 
 
 def density_of(film: Film, purpose: str = "the mass") -> float:
-    """A film's density in kg/m3. Raises DesignError with the purpose if it is unknown."""
+    """Return a film's density in kg/m3. Raises DesignError with the purpose if it is unknown."""
     if film.density is None:
         raise DesignError(
             f"{purpose} needs the density of {film.material}, {film.product}; add "
@@ -107,12 +107,12 @@ def density_of(film: Film, purpose: str = "the mass") -> float:
 
 
 def film_name(product: str, thickness: float) -> str:
-    """Return product and thickness (mm) as one text: "Stretchlon 200, 0.038 mm"."""
+    """Return a product and thickness (mm) as text: "Stretchlon 200, 0.038 mm"."""
     return f"{product}, {thickness:g} mm"
 
 
 def in_order(materials: Iterable[Material]) -> list[Material]:
-    """Every material once: TPE, PTFE, then the others by name."""
+    """Return every material once: TPE, PTFE, then the others by name."""
     rank = {material: place for place, material in enumerate(FIRST)}
     return sorted(set(materials), key=lambda name: (rank.get(name, len(FIRST)), name))
 
@@ -143,6 +143,6 @@ MASKS = (
 
 
 def ink(film: Film) -> Ink:
-    """The colours of a film; the fifth of a kind repeats the first one's."""
+    """Return the colours of a film; the fifth of a kind repeats those of the first."""
     inks = MASKS if film.is_mask else STRUCTURAL
     return inks[film.shade % len(inks)]

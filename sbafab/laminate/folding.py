@@ -1,4 +1,4 @@
-"""Folded films: the flat part for two or more layers, and its halves read back.
+"""Folded films: the flat part for two or more layers, and its halves after folding.
 
 The part is oriented like its lowest layer; each further layer is turned over about its fold line.
 """
@@ -20,7 +20,7 @@ FAR = 1e4
 
 
 def fold_roots(folds: Iterable[Fold]) -> dict[int, int]:
-    """Return, by index, the layer that each folded one is cut with: the lowest of its film."""
+    """Return, by index, the layer with which each folded layer is cut: the lowest of its film."""
     roots: dict[int, int] = {}
     for fold in sorted(folds, key=lambda fold: fold.lower):
         roots[fold.upper] = roots.get(fold.lower, fold.lower)
@@ -28,10 +28,10 @@ def fold_roots(folds: Iterable[Fold]) -> dict[int, int]:
 
 
 def flat_part(layer: int, folds: Sequence[Fold], profiles: Sequence[Region]) -> Region:
-    """Return the part that a layer is cut from: its profile, and the profiles of all layers that
-    fold onto it.
+    """Return the part from which a layer is cut: its profile, and the profiles of all layers folded
+    onto it.
 
-    ``profiles`` are of all layers, bottom to top.
+    ``profiles`` are those of all layers, bottom to top.
     """
     return union(
         unfolded(profiles[index - 1], lines) for index, lines in _members(layer, folds).items()
@@ -39,7 +39,7 @@ def flat_part(layer: int, folds: Sequence[Fold], profiles: Sequence[Region]) -> 
 
 
 def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]:
-    """Return the layers that a flat part folds into, by index, each in its folded position.
+    """Return the layers formed by folding a flat part, by index, each in its folded position.
 
     Folded layers lie on the left of their fold lines (``toward``).
     """
@@ -60,7 +60,7 @@ def halves(layer: int, folds: Sequence[Fold], part: Region) -> dict[int, Region]
 
 
 def _members(layer: int, folds: Sequence[Fold]) -> dict[int, list[tuple[Point, Point]]]:
-    """The layers of a part, lowest first, with the lines about which each is unfolded, in order."""
+    """The layers of a part, lowest first, each with the lines of its unfolding, in order."""
     members: dict[int, list[tuple[Point, Point]]] = {layer: []}
     for fold in sorted(folds, key=lambda fold: fold.lower):
         if fold.lower in members:
@@ -69,7 +69,7 @@ def _members(layer: int, folds: Sequence[Fold]) -> dict[int, list[tuple[Point, P
 
 
 def unfolded(region: Region, lines: Iterable[tuple[Point, Point]]) -> Region:
-    """Return a region turned over about lines, one after the other."""
+    """Return a region turned over about lines, one after another."""
     for line in lines:
         region = region.mapped(_reflection(line), 1.0, True)
     return region
@@ -88,7 +88,7 @@ def _reflection(line: tuple[Point, Point]) -> Similarity:
 
 
 def _side(line: tuple[Point, Point], lines: Iterable[tuple[Point, Point]]) -> Region:
-    """The half plane to the left of a line, as far as unfolded parts reach."""
+    """Return the half plane to the left of a line, large enough for unfolded parts."""
     (x0, y0), (x1, y1) = line
     length = math.dist(*line)
     ux, uy = (x1 - x0) / length * FAR, (y1 - y0) / length * FAR
@@ -111,6 +111,6 @@ def distance_from(line: tuple[Point, Point], p: Point) -> float:
 
 
 def toward(line: tuple[Point, Point], region: Region) -> tuple[Point, Point]:
-    """Return the line in the direction that has most of a region on its left."""
+    """Return the line, directed with most of a region on its left."""
     ends = [distance_from(line, edge.start) for edge in region.edges]
     return line if max(ends, default=0.0) >= -min(ends, default=0.0) else (line[1], line[0])

@@ -1,7 +1,7 @@
 """The order of joining films: presses, seams and folds, each with its reason.
 
-A press bonds all films in it at once; a tool heats every film under its path. So both are possible
-only while the work has no faces that they would weld by mistake.
+A press bonds all its films at once; a tool heats every film under its path. Either is possible only
+while the work has no faces that would weld by mistake.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ LEAST_WELD = 1e-3
 class Joining:
     """An act of joining, counted from 1: a press, a seam or a fold.
 
-    ``layers`` are the layers involved, by index, and ``bodies`` the same grouped as they arrive,
-    lowest first: earlier joined bodies, and single layers. ``from_below``: a film above the seam
-    would melt under the tool, so the work is turned over and the path mirrored.
+    ``layers`` are the layers involved, by index, and ``bodies`` groups them, lowest first:
+    previously joined bodies, and single layers. ``from_below``: a film above the seam would melt
+    under the tool, so the work is turned over and the path mirrored.
     """
 
     number: int
@@ -45,7 +45,7 @@ class Joining:
 
 
 class _Task(NamedTuple):
-    """A task: interfaces by index, ``first`` to ``last``, to join in the press or by a seam."""
+    """A task: the interfaces from ``first`` to ``last``, to be joined in the press or by a seam."""
 
     first: int
     last: int
@@ -57,15 +57,16 @@ class _Task(NamedTuple):
 
 
 def is_only_pressed(laminate: Laminate) -> bool:
-    """Return True for films that are only joined in the press, and not folded."""
+    """Return True for films that are joined only in the press, and not folded."""
     return not laminate.seams and not laminate.folds
 
 
 def joinings(laminate: Laminate) -> tuple[Joining, ...]:
     """Return all acts of joining, in order.
 
-    Presses come before seams, and seams in the listed order, unless ``bonds`` say otherwise or one
-    of them is only possible earlier. Raises DesignError with the conflict if there is no order.
+    Presses come before seams, and seams in the listed order, unless ``bonds`` requires another
+    order or one of them is possible only earlier. Raises DesignError with the conflict if there is
+    no order.
     """
     return stored(laminate, "_joinings", _joinings)
 
@@ -87,7 +88,7 @@ def _joinings(laminate: Laminate) -> tuple[Joining, ...]:
 
 
 def _refuse_strangers(laminate: Laminate) -> None:
-    """Raises DesignError for neighbours that nothing joins, although their faces meet."""
+    """Raise DesignError for neighbours with facing surfaces that nothing joins."""
     folded = {(fold.lower, fold.upper) for fold in laminate.folds}
     for gap in laminate.interfaces if laminate.bonds else ():
         pair = gap.below.index, gap.above.index
@@ -95,17 +96,17 @@ def _refuse_strangers(laminate: Laminate) -> None:
             continue
         below, above = gap.below.faces[0], gap.above.faces[1]
         raise DesignError(
-            f"layers {pair[0]} and {pair[1]} face each other with {below} and {above}, which "
-            "nothing in face_bonds joins in the press, and no seam lies between them; turn one of "
-            "them, add a seam, or say in [face_bonds] what joins these faces"
+            f"layers {pair[0]} and {pair[1]} face each other with {below} and {above}, which no "
+            "entry of [face_bonds] joins in the press, and no seam lies between them; turn one "
+            "of them over, add a seam, or add these faces to [face_bonds]"
         )
     for seam in laminate.seams if laminate.bonds else ():
         lower, upper = laminate.layer(seam.below), laminate.layer(seam.above)
         if laminate.bond_of(lower, upper, seam.tool) is None:
             raise DesignError(
                 f"seam {seam.name}: layers {seam.below} and {seam.above} face each other with "
-                f"{lower.faces[0]} and {upper.faces[1]}, which nothing in face_bonds joins by "
-                f"{seam.tool}; turn one of them, or add it to [face_bonds]"
+                f"{lower.faces[0]} and {upper.faces[1]}, which no entry of [face_bonds] joins by "
+                f"{seam.tool}; turn one of them over, or add these faces to [face_bonds]"
             )
 
 
@@ -119,18 +120,18 @@ class _Conflict(NamedTuple):
 
     @property
     def words(self) -> str:
-        """The fault and its place."""
+        """The fault and its location."""
         return f"{self.subject} {self.harm}{self.where}"
 
 
 class _Search:
-    """The search for an order of tasks in which none welds or melts what it should not."""
+    """The search for an order of tasks in which no task welds or melts films by mistake."""
 
     def __init__(self, laminate: Laminate) -> None:
         self.laminate, self.gaps = laminate, laminate.interfaces
 
     def tasks(self) -> list[_Task]:
-        """Runs of interfaces that bond in the press, bottom to top, then seams as listed."""
+        """Interfaces that bond in the press together, bottom to top, then seams as listed."""
         tasks = []
         for is_pressed, run in groupby(self.gaps, key=lambda gap: gap.pressed):
             indices = [gap.index for gap in run]
@@ -145,7 +146,7 @@ class _Search:
     def order(
         self, waiting: Sequence[_Task], done: Sequence[_Task], failed: set[frozenset[_Task]]
     ) -> list[_Task] | None:
-        """Return the first order without a conflict, if any; ``failed`` sets are dead ends."""
+        """The first order without a conflict, if any; ``failed`` holds sets that lead to none."""
         if not waiting:
             return []
         key = frozenset(done)
@@ -187,12 +188,12 @@ class _Search:
         return self._harm(task, self._body(task, done))
 
     def _bond(self, task: _Task) -> FaceBond | None:
-        """The entry of ``bonds`` for a task's faces."""
+        """Return the entry of ``bonds`` for a task's faces."""
         gap = self.gaps[task.first - 1]
         return self.laminate.bond_of(gap.below, gap.above, task.process)
 
     def _body(self, task: _Task, done: Sequence[_Task]) -> Sequence[Interface]:
-        """The interfaces of the body that a task works on, with everything joined to it."""
+        """Return the interfaces of a task's body, with everything joined to it."""
         first, last = task.first, task.last
         joined = {index for past in done for index in range(past.first, past.last + 1)}
         while first - 1 in joined:
@@ -202,7 +203,7 @@ class _Search:
         return self.gaps[first - 1 : last]
 
     def _harm(self, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
-        """Return what a task would do to the films of the interfaces, or None for no harm."""
+        """Return the damage that a task would do to films of the interfaces, or None for none."""
         if task.seam is None:
             return self._pressed_by_mistake(task, gaps)
         return self._welded_by_mistake(task.seam, task, gaps) or _covered(task.seam, task, gaps)
@@ -226,9 +227,9 @@ class _Search:
         return None
 
     def _open(self, gap: Interface) -> Region:
-        """Contact of films that are not meant to bond, without a mask between them.
+        """Return contact between films that are not meant to bond, without a mask between them.
 
-        Films may weld outside a chamber's seams: there they are a flap that holds no pressure.
+        Films may weld outside a chamber's seams, where they form a flap that holds no pressure.
         """
         bare = gap.unbonded - gap.mask if gap.masks else gap.unbonded
         if gap.kind != "chamber":
@@ -290,7 +291,7 @@ class _Search:
         before: Sequence[_Conflict | None],
         count: int,
     ) -> Iterator[Joining]:
-        """Yield a task's folds, then its joining. ``before``: why tasks listed earlier wait."""
+        """Yield a task's folds, then its joining. ``before`` tells why earlier tasks wait."""
         gaps = self._body(task, done)
         layers = tuple(range(gaps[0].below.index, gaps[-1].above.index + 1))
         laid = {index for past in done for index in self._layers(past)}
@@ -318,7 +319,7 @@ class _Search:
     def _bodies(
         self, layers: Sequence[int], done: Sequence[_Task], folded: Sequence[Fold]
     ) -> tuple[tuple[int, ...], ...]:
-        """Return earlier joined bodies and single layers, lowest first."""
+        """Return previously joined bodies and single layers, lowest first."""
         inside = {index for past in done for index in self._layers(past)[:-1]}
         inside |= {index for fold in folded for index in range(fold.lower, fold.upper)}
         bodies: list[list[int]] = [[]]
@@ -354,7 +355,7 @@ def _named(seam: Seam) -> str:
 
 
 def _covered(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> _Conflict | None:
-    """Return the conflict of a seam covered by melting films both from above and from below."""
+    """Return the conflict of a seam with melting films both above and below it."""
     over = _cover(seam, task, gaps)
     under = _melting([gap.below for gap in gaps if gap.index < task.first], seam)
     if over is None or under is None:
@@ -373,7 +374,7 @@ def _cover(seam: Seam, task: _Task, gaps: Sequence[Interface]) -> Layer | None:
 
 
 def _melting(films: Sequence[Layer], seam: Seam) -> Layer | None:
-    """The first film over a seam that melts before the films under it are warm."""
+    """Return the first film over a seam that melts before the films below are warm."""
     melting = (film for film in films if not film.film.stays_solid)
     return next((f for f in melting if (f.profile & seam.region).area > LEAST_WELD), None)
 

@@ -28,7 +28,7 @@ PRESS: BondProcess = "press"
 class FaceBond:
     """Two face materials that bond to each other, in either order, and the process.
 
-    ``temperature_c`` is the bonding temperature, C, None if not stated; ``after`` names the bond
+    ``temperature_c`` is the bonding temperature in C, None if not stated; ``after`` names a bond
     that must be made first.
     """
 
@@ -39,7 +39,7 @@ class FaceBond:
     after: str | None = None
 
     def joins(self, a: str, b: str) -> bool:
-        """Return True if these are the two faces."""
+        """Return True if these are its two faces."""
         return {a, b} == set(self.faces)
 
 
@@ -50,8 +50,8 @@ PortKind = Literal["place", "hole"]
 class Seam:
     """A bond made by a tool along a path, between the structural layers ``below`` and ``above``.
 
-    ``path`` holds chains of edges, each open or closed; the bond reaches half of ``width`` to both
-    sides of it. ``order`` counts the seams in order of making, from 1.
+    ``path`` holds chains of edges, each open or closed; the bond extends by half of ``width`` to
+    each side. ``order`` counts the seams in order of making, from 1.
     """
 
     name: str
@@ -79,8 +79,8 @@ class Seam:
 class Fold:
     """A film folded along a straight line: layers ``lower`` and ``upper`` are halves of one part.
 
-    ``line`` are two points of the fold. The film is continuous from one half to the other there, so
-    a fold does not leak. The part is cut flat: the upper half mirrored about the line.
+    ``line`` holds two points of the fold. The film is continuous from one half to the other there,
+    so a fold does not leak. The part is cut flat: the upper half mirrored about the line.
     """
 
     lower: int
@@ -93,8 +93,8 @@ class Port:
     """A named place at ``at`` in the gap between the structural layers ``below`` and ``above``.
 
     Nets are declared between ports: the mouth of an inlet, a pocket, the end of a channel. A "hole"
-    is an opening of the top or bottom film beside that gap; a tube of ``tube_diameter`` mm outside
-    (None: not known) is glued to the film around it.
+    is an opening of the top or bottom film beside that gap; a tube with an outer diameter of
+    ``tube_diameter`` mm (None if unknown) is glued to the film around it.
     """
 
     name: str
@@ -107,7 +107,7 @@ class Port:
 
 @dataclass(frozen=True)
 class Net:
-    """Ports that should be joined by voids, and to no other port or the outside."""
+    """Ports that voids should connect with each other, and with no other port or the outside."""
 
     name: str
     ports: tuple[str, ...]
@@ -121,8 +121,9 @@ def chamber_gaps(
 ) -> dict[tuple[int, int], bool]:
     """Return the gaps between structural layers, by their layers' indices: True for a chamber.
 
-    A chamber mask makes a chamber, and so do seams without any mask, unless one of the layers is a
-    sheet, or a cap lies below or a base above: these end balloons. ``seams`` are pairs of layers.
+    A chamber mask makes a chamber, and so do seams without a mask, unless one of the layers is a
+    sheet, or the lower is a cap or the upper a base: these end balloons. ``seams`` are pairs of
+    layers.
     """
     films = [index for index, role in enumerate(roles, 1) if not role.endswith("-mask")]
     gaps = {}
@@ -138,8 +139,8 @@ def chamber_gaps(
 def balloon_numbers(roles: Sequence[str], gaps: Mapping[tuple[int, int], bool]) -> list[int | None]:
     """Return the balloon of every layer, counted from 1 at the bottom, by its ``chamber_gaps``.
 
-    A film belongs to the chamber above it, or else to the one below. A sheet and a mask beside it
-    belong to none.
+    A film belongs to the chamber above it, else to the one below. A sheet and its mask belong to
+    none.
     """
     numbers: list[int | None] = [None] * len(roles)
     count = 0

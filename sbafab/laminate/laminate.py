@@ -1,7 +1,7 @@
 """The laminate: layers bottom to top, and the interfaces between its TPE layers.
 
-The single model behind rules, cut files, press schedule, meshes and pictures. Lengths are mm, the
-origin lies on the actuator's axis, z points up from the press plate.
+The only model for rules, cut files, press schedule, meshes and pictures. Lengths are in mm; the
+origin lies on the actuator's axis, and z points up from the press plate.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ class Layer:
     ``index`` and ``balloon`` count from 1 at the bottom (``balloon`` is None for a sheet and its
     mask); ``z`` is the height of the layer's lower face with every film at its nominal thickness.
     ``pieces`` is the number of separate parts of its role. ``pattern`` names the shape: equal
-    profiles of one material share it. A layer that is ``turned`` lies with its upper face down.
+    profiles of one material share it. A ``turned`` layer lies with its upper face down.
     """
 
     index: int
@@ -53,7 +53,7 @@ class Layer:
 
     @property
     def name(self) -> str:
-        """File stem, for example ``003_TPE_wall``."""
+        """The file stem, for example ``003_TPE_wall``."""
         return f"{self.index:03d}_{self.film.material}_{self.role}"
 
     def __repr__(self) -> str:
@@ -66,7 +66,7 @@ class Layer:
 
     @property
     def faces(self) -> tuple[str, str]:
-        """The materials of its faces as laid, the upper one first."""
+        """The materials of its faces as laid, upper face first."""
         plain = self.film.material.lower()
         upper, lower = self.film.faces or (plain, plain)
         return (lower, upper) if self.turned else (upper, lower)
@@ -88,9 +88,9 @@ class Bore:
 class Chamber:
     """A chamber: balloons that share one inlet.
 
-    ``centres`` holds a point (x, y) in mm inside the pocket of every stack the chamber feeds: one,
-    or several where pockets are joined by a manifold. ``balloons`` are the balloons with its
-    pockets, counted from 1 at the bottom; all if empty.
+    ``centres`` holds a point (x, y) in mm inside the pocket of every stack that the chamber feeds:
+    several if a manifold joins pockets. ``balloons`` are the balloons with its pockets, counted
+    from 1 at the bottom; all if empty.
     """
 
     name: str
@@ -119,12 +119,12 @@ class Inlet:
     tube_diameter: float
 
     def depth(self, p: Point) -> float:
-        """Return the distance of a point inside the mouth's line, mm."""
+        """Return the distance of a point inward from the mouth's line, mm."""
         (x, y), (dx, dy) = self.mouth, self.direction
         return (x - p[0]) * dx + (y - p[1]) * dy
 
     def offset(self, p: Point) -> float:
-        """Return how far a point is to the right of the mouth's middle, mm."""
+        """Return the distance of a point to the right of the mouth's middle, mm."""
         (x, y), (dx, dy) = self.mouth, self.direction
         return (p[0] - x) * dy - (p[1] - y) * dx
 
@@ -133,8 +133,8 @@ class Inlet:
 class Pin:
     """A dowel pin of the press fixture; it holds every layer with an opening at its place.
 
-    ``centre`` (x, y) and ``diameter`` are mm, like ``clearance``, the excess diameter of the
-    layers' hole over the pin.
+    ``centre`` (x, y), ``diameter`` and ``clearance`` are in mm; the clearance is the excess of the
+    hole's diameter over the pin's.
     """
 
     name: str
@@ -144,7 +144,7 @@ class Pin:
 
     @property
     def hole(self) -> float:
-        """Diameter of the layers' hole for the pin, mm."""
+        """The diameter of the hole in the layers for the pin, mm."""
         return self.diameter + self.clearance
 
 
@@ -153,13 +153,13 @@ class Laminate:
     """A stack of layers, bottom to top, with its chambers, inlets and pins.
 
     ``outline`` is the union of the films of all balloons, without inlet tabs and ears; empty if
-    only the layers are known. ``pins_in_full_bonds``: the pins of ears stay in while TPE melts.
-    ``middle_first``: all layers between base and cap are tacked on the pins before any other bond.
-    ``tube``: outer diameter in mm of the tube that its sheet is wrapped round, if any; ``lumen`` is
+    only the layers are known. ``pins_in_full_bonds``: the pins in the ears stay in place while TPE
+    melts. ``middle_first``: all layers between base and cap are tacked on the pins before any other
+    bond. ``tube`` is the outer diameter in mm of the tube that its sheet wraps, if any; ``lumen``
     the diameter of the channel through all layers, mm. ``seams`` are bonds of a moving tool,
-    ``folds`` join halves of one film, and ``nets`` say which ``ports`` are meant to be joined.
-    ``bonds`` say which faces bond, and by what; without any, all structural faces bond in the press
-    except those bonded by seams.
+    ``folds`` join halves of one film, and ``nets`` lists the ``ports`` that are meant to be
+    connected. ``bonds`` lists the faces that bond, with the process; without entries, all
+    structural faces bond in the press except those bonded by seams.
     """
 
     name: str
@@ -188,7 +188,7 @@ class Laminate:
 
     @cached_property
     def interfaces(self) -> tuple[Interface, ...]:
-        """One between every two consecutive TPE layers, bottom to top."""
+        """The interfaces between consecutive TPE layers, bottom to top."""
         regions: dict[tuple[object, ...], Regions] = {}
         interfaces: list[Interface] = []
         films = [place for place, layer in enumerate(self.layers) if not layer.is_mask]
@@ -215,7 +215,7 @@ class Laminate:
         return tuple(interfaces)
 
     def seams_between(self, below: Layer, above: Layer) -> tuple[Seam, ...]:
-        """The seams that bond two structural layers, in order of making."""
+        """Return the seams that bond two structural layers, in order of making."""
         pair = below.index, above.index
         seams = (seam for seam in self.seams if (seam.below, seam.above) == pair)
         return tuple(sorted(seams, key=lambda seam: seam.order))
@@ -236,12 +236,12 @@ class Laminate:
 
     @property
     def tube_holes(self) -> tuple[Port, ...]:
-        """Ports that are holes of an outer film, each with a tube glued on."""
+        """Ports that are holes of an outer film, each with a glued tube."""
         return tuple(port for port in self.ports if port.kind == "hole")
 
     @property
     def tube_count(self) -> int:
-        """Number of tubes: one for each inlet and each hole."""
+        """The number of tubes: one for each inlet and each hole."""
         return len(self.inlets) + len(self.tube_holes)
 
     def mouth_gap(self, inlet: Inlet) -> Interface | None:
@@ -252,7 +252,7 @@ class Laminate:
 
     @property
     def glued_films(self) -> tuple[Film, ...]:
-        """The structural films that tubes are glued to: at mouths, and around holes."""
+        """The structural films with glued tubes: at mouths, and around holes."""
         outer = self.tpe_layers[0], self.tpe_layers[-1]
         layers = [
             layer
@@ -267,7 +267,7 @@ class Laminate:
 
     @cached_property
     def tpe_layers(self) -> tuple[Layer, ...]:
-        """The layers that bond: all of structural films, TPE or further ones."""
+        """The layers that bond: all structural films, TPE or others."""
         return tuple(layer for layer in self.layers if not layer.is_mask)
 
     @property
@@ -277,7 +277,7 @@ class Laminate:
 
     @cached_property
     def patterns(self) -> dict[str, tuple[Layer, ...]]:
-        """One layer of every distinct pattern, in stacking order."""
+        """One layer of each distinct pattern, in stacking order."""
         groups: dict[str, list[Layer]] = {}
         for layer in self.layers:
             groups.setdefault(layer.pattern, []).append(layer)
@@ -303,8 +303,8 @@ class Laminate:
     def as_cut(self, layer: Layer) -> Region:
         """Return the region in a layer's cut file.
 
-        Layers of a folded film are cut as one flat part, in the file of the lowest of them. All
-        films are cut upper face up, so a layer laid turned over is drawn turned over.
+        Layers of a folded film are cut as one flat part, in the file of the lowest layer. All films
+        are cut upper face up, so a layer laid turned over is drawn turned over.
         """
         flat, lowest = layer.profile, layer
         if self.folds:
@@ -323,11 +323,11 @@ class Laminate:
         return fold_roots(self.folds)
 
     def pins_holding(self, layer: Layer) -> tuple[Pin, ...]:
-        """The pins on which the layer has a hole that fits; a wider opening does not hold it."""
+        """The pins for which the layer has a fitting hole; a wider opening does not hold it."""
         return self.pins_in(layer.profile)
 
     def pins_in(self, part: Region) -> tuple[Pin, ...]:
-        """The pins on which this part of a layer has a hole that fits."""
+        """Return the pins for which this part of a layer has a fitting hole."""
         circles = [hole.circle for hole in part.holes if hole.circle is not None]
         return tuple(
             pin
@@ -355,9 +355,9 @@ InterfaceKind = Literal["chamber", "separator", "bond"]
 class Interface:
     """Two TPE layers, below and above, and the masks between them.
 
-    contact: where both layers are; bond: contact without mask; unbonded: contact under mask.
-    ``seams`` bond only within their regions; an interface that is not ``pressed`` bonds only in
-    them. At ``folds`` one film continues from below to above.
+    contact: the overlap of both layers; bond: contact without a mask; unbonded: contact under a
+    mask. ``seams`` bond only within their regions; an interface that is not ``pressed`` bonds only
+    in them. At ``folds`` one film continues from below to above.
     """
 
     index: int
@@ -375,32 +375,32 @@ class Interface:
 
     @property
     def fold_lines(self) -> tuple[tuple[Point, Point], ...]:
-        """Lines at which one film continues from below to above."""
+        """The lines at which one film continues from below to above."""
         return tuple(fold.line for fold in self.folds)
 
     @cached_property
     def whole_bond(self) -> Region:
-        """The bond, and the bond of the unfolded film beyond each fold, where it has no edge."""
+        """The bond, plus the bond of the unfolded film beyond each fold, where it has no edge."""
         beyond = [unfolded(self.bond, [line]) for line in self.fold_lines]
         return union([self.bond, *beyond]) if beyond else self.bond
 
     @property
     def masked(self) -> Region:
-        """Contact that the press would weld if there were no masks."""
+        """The contact that the press would weld without masks."""
         return (
             (self.contact & self.mask if self.seams else self.unbonded) if self.pressed else NOTHING
         )
 
     @property
     def gap(self) -> float:
-        """Height in mm between the two layers: the thickness of the masks, or their laid height."""
+        """The height in mm between the two layers: the mask thickness, or the laid height."""
         if not self.masks:
             return round(self.above.z - self.z, 9)
         return sum(mask.film.thickness for mask in self.masks)
 
     @property
     def z(self) -> float:
-        """Height of the gap's lower face."""
+        """The height of the gap's lower face."""
         return self.below.z + self.below.film.thickness
 
     @property
@@ -409,7 +409,7 @@ class Interface:
 
     @cached_property
     def pattern(self) -> tuple[str, ...]:
-        """Equal for interfaces of equal profiles, bonded by equal seams."""
+        """A key that is equal for interfaces with equal profiles and seams."""
         return (
             self.below.pattern,
             *(mask.pattern for mask in self.masks),
@@ -432,7 +432,7 @@ def interface_regions(below: Region, above: Region, masks: Sequence[Region]) -> 
 
 
 def _seamed(regions: Regions, seams: Sequence[Seam]) -> Regions:
-    """The regions of an interface that seams alone bond; a seam bonds nothing through a mask."""
+    """The regions of an interface bonded by seams only; a seam bonds nothing through a mask."""
     mask, contact, bare, _ = regions
     bond = bare & union([seam.region for seam in seams]) if seams else NOTHING
     return mask, contact, bond, contact - bond
@@ -442,29 +442,29 @@ def _seamed(regions: Regions, seams: Sequence[Seam]) -> Regions:
 
 
 def outline_diameter(laminate: Laminate) -> float:
-    """Return the diameter of the circle round the axis around all films without tabs and ears.
+    """Return the diameter of the circle about the axis around all films without tabs and ears.
 
-    The paper's 3-DoF actuator fits 15 (Sec. 2). It is measured on each film's part within the
-    laminate's outline.
+    The paper's 3-DoF actuator fits 15 mm (Sec. 2). It is measured on the part of each film within
+    the laminate's outline.
     """
     films = {layer.pattern: layer.profile for layer in laminate.tpe_layers}
     return _round_axis(Region(film.outers) & laminate.outline for film in films.values())
 
 
 def overall_diameter(laminate: Laminate) -> float:
-    """Diameter of the circle around the axis that holds every layer, with tabs, tails and ears."""
+    """The diameter of the circle about the axis around every layer, with tabs, tails and ears."""
     return _round_axis(layers[0].profile for layers in laminate.patterns.values())
 
 
 def beyond_the_outline(laminate: Laminate) -> str:
-    """The parts outside the outline, which make the overall diameter larger: "3 inlet tabs"."""
+    """Return the parts outside the outline that increase the overall diameter: "3 inlet tabs"."""
     count = len(laminate.inlets)
     tabs = f"{count} inlet tab{'s' if count > 1 else ''}"
     return f"{tabs} and the ears" if laminate.registration == "ears" else tabs
 
 
 def film_mass(laminate: Laminate) -> float:
-    """Mass in g of all films, including tabs and ears; without tubing, glue and fluid.
+    """Return the mass in g of all films, including tabs and ears; without tubing, glue and fluid.
 
     Raises DesignError if the density of a film is unknown.
     """

@@ -1,7 +1,7 @@
-"""Steps of the lay-up: the stacks laid on each other in each closing of the press, and its pins;
-the height of the films after the press.
+"""Steps of the lay-up: the stacks joined in each closing of the press, and its pins; the height of
+the films after the press.
 
-The paper's four steps (Sec. 2), except those with nothing to press. Ears also register layers in
+The paper's four steps (Sec. 2), except steps with nothing to press. Ears also register layers in
 full bonds: a flash bond on the pins comes first, then the full bond without pins.
 """
 
@@ -27,11 +27,11 @@ PLATE_MARGIN = 6.0
 
 @dataclass(frozen=True)
 class LayUpStep:
-    """One closing of the press, or a seam, steps counted from 1.
+    """One closing of the press, or a seam; steps count from 1.
 
-    ``stacks`` lie on each other, lowest first, and ``adds`` are their layers that are new in this
-    step, both by layer index; ``pins`` are the dowel pins that are in. ``joining`` is the act of
-    joining that the step belongs to, if films are also joined outside the press.
+    ``stacks`` are laid on each other, lowest first, and ``adds`` are their layers that are new in
+    this step, both by layer index; ``pins`` are the dowel pins in place. ``joining`` is the joining
+    operation of the step, if films are also joined outside the press.
     """
 
     number: int
@@ -50,17 +50,17 @@ class LayUpStep:
 def press_steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
     """Return the steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins. With channel pins full bonds are pressed without
-    any: base and cap have no bore for one, and a lumen pin would fit but stays out, as in the
+    Flash bonds hold layers in place on their pins. With channel pins, full bonds are pressed
+    without pins: base and cap have no bore, and a lumen pin would fit but is omitted, as in the
     paper. ``laminate.middle_first`` tacks all layers between base and cap in one step, and presses
-    no balloon by itself. With ears base and cap are tacked on the pins by a flash bond, and the
-    full bond after it has no pins either, unless ``laminate.pins_in_full_bonds``.
+    no balloon separately. With ears, base and cap are tacked on the pins by a flash bond, and the
+    subsequent full bond also has no pins, unless ``laminate.pins_in_full_bonds``.
     """
     return stored(laminate, "_steps", _steps)
 
 
 def lay_up_steps(laminate: Laminate) -> tuple[LayUpStep, ...]:
-    """Return all steps in which layers are laid on each other: presses, seams and folds, in order.
+    """Return all steps in which layers are joined: presses, seams and folds, in order.
 
     A seam or fold has no pins, and is labelled as a flash bond.
     """
@@ -100,12 +100,12 @@ Stacks = tuple[tuple[int, ...], ...]
 
 
 def _plan(name: StepName, bond: BondState, stacks: Stacks, adds: tuple[int, ...]) -> LayUpStep:
-    """A step before its number and its pins are known."""
+    """A step before it has a number and pins."""
     return LayUpStep(0, name, bond, tuple(stack for stack in stacks if stack), adds, ())
 
 
 def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[LayUpStep]:
-    """Return the press steps of these layers that add any."""
+    """Return the press steps that add any of these layers."""
     films = [layer for layer in map(laminate.layer, indices) if not layer.is_mask]
     base = next((layer for layer in films if layer.role == "base"), films[0]).index
     wall = next((layer.index for layer in films if layer.index > base), base)
@@ -135,7 +135,7 @@ def _plans(laminate: Laminate, indices: tuple[int, ...]) -> list[LayUpStep]:
 
 
 def _tacked(plan: LayUpStep) -> tuple[LayUpStep, ...]:
-    """A full bond as two steps: a flash bond of the same stacks, then their full bond."""
+    """Split a full bond into two steps: a flash bond of the same stacks, then their full bond."""
     if plan.bond == "flash":
         return (plan,)
     tack: StepName = "tack_bottom" if plan.name == "bond_bottom" else "tack_all"
@@ -149,7 +149,7 @@ def _step(number: int, plan: LayUpStep, laminate: Laminate) -> LayUpStep:
 
 
 def _pins_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Pin, ...]:
-    """The pins that hold at least one of the layers and meet no film in any of them."""
+    """Return the pins that hold at least one of the layers and meet no film in any of them."""
     shapes = distinct_layers(laminate, layers)
     return tuple(
         pin
@@ -168,7 +168,7 @@ def pressed_layers(laminate: Laminate) -> list[Layer]:
 def films_without_minutes(
     laminate: Laminate, stated: Iterable[tuple[str, float]]
 ) -> tuple[Film, ...]:
-    """Return the pressed structural films with a product and thickness (mm) not ``stated``."""
+    """The pressed structural films whose product and thickness (mm) are not in ``stated``."""
     pairs = tuple(stated)
     films = dict.fromkeys(layer.film for layer in pressed_layers(laminate) if not layer.is_mask)
     return tuple(film for film in films if not any(film.is_a(*pair) for pair in pairs))
@@ -176,9 +176,11 @@ def films_without_minutes(
 
 @dataclass(frozen=True)
 class FoldedHeight:
-    """Height of a flat laminate after the press: ``solid`` mm of masks, films that do not melt in a
-    press step and the ``unmeasured`` ones, whose flow is unknown; ``factor`` is the press factor on
-    the others, ``molten`` mm as bought.
+    """Height of a flat laminate after the press.
+
+    ``solid`` is the thickness in mm of masks, films that do not melt in a press step and the
+    ``unmeasured`` ones, whose flow is unknown; ``factor`` is the press factor on the others,
+    ``molten`` mm as bought.
     """
 
     solid: float
@@ -193,12 +195,12 @@ class FoldedHeight:
 
     @property
     def nominal(self) -> float:
-        """The sum of the films as bought in mm."""
+        """The sum of the films as bought, in mm."""
         return self.solid + self.molten
 
     @property
     def remark(self) -> str:
-        """Which of its films have an unknown flow, as text; else empty."""
+        """Which films have an unknown flow, as text; empty if none."""
         names = sorted({film.product for film in self.unmeasured})
         return f"{' and '.join(names)} as bought: no press factor is known" if names else ""
 
@@ -218,7 +220,7 @@ def folded_height(laminate: Laminate, factor: float, product: str) -> FoldedHeig
 
 
 def is_laid_by_hand(laminate: Laminate, step: LayUpStep) -> bool:
-    """Return True if a layer, or an earlier stack, is placed by hand, without a pin.
+    """Return True if a layer or an earlier stack is placed by hand, without a pin.
 
     A whole stack that is laid down again needs no alignment.
     """
@@ -236,7 +238,7 @@ def is_laid_by_hand(laminate: Laminate, step: LayUpStep) -> bool:
 def pins_when_added(laminate: Laminate) -> dict[int, tuple[Pin, ...]]:
     """Return, by layer index, the pins that hold the layer in the step that adds it.
 
-    A hole that fits a pin does not hold a layer where the pin is out.
+    A fitting hole does not hold a layer if its pin is out.
     """
     fitting = {
         pattern: laminate.pins_holding(layers[0]) for pattern, layers in laminate.patterns.items()
@@ -254,5 +256,5 @@ def stack_count(laminate: Laminate, layers: Sequence[int]) -> int:
 
 
 def distinct_layers(laminate: Laminate, layers: Sequence[int]) -> tuple[Layer, ...]:
-    """One layer of each pattern among the layers."""
+    """Return one layer of each pattern."""
     return tuple({laminate.layer(i).pattern: laminate.layer(i) for i in layers}.values())

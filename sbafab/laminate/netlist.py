@@ -1,7 +1,8 @@
-"""Netlists: the intended connections, by name, compared with the connections by a laminate's voids.
+"""Netlists: intended connections, by name, compared with the connections through a laminate's
+voids.
 
-Read from JSON: this program's own form (``sbafab/nets@1``), or the connections of a ParchMint file
-(3DuF's and the benchmarks' exchange format).
+Read from JSON: this program's format (``sbafab/nets@1``), or the connections of a ParchMint file
+(the exchange format of 3DuF and its benchmarks).
 """
 
 from __future__ import annotations
@@ -27,14 +28,14 @@ NO_MASK = "INTEGRATION"
 
 @dataclass(frozen=True)
 class Netlist:
-    """Nets by name, each with the names of its ports and chambers, and ports with a place."""
+    """Named nets, each with its port and chamber names, and ports with a position."""
 
     nets: Mapping[str, tuple[str, ...]]
     ports: tuple[Port, ...] = ()
 
 
 class NetlistComparison(NamedTuple):
-    """Nets that match, nets that are open, pairs of nets that are shorted, names that are missing.
+    """Matched nets, open nets, shorted pairs of nets, and missing names.
 
     A net with a missing name is neither open nor matched.
     """
@@ -48,10 +49,10 @@ class NetlistComparison(NamedTuple):
 def compare(
     groups: Iterable[frozenset[str]], nets: Mapping[str, Sequence[str]]
 ) -> NetlistComparison:
-    """Compare nets with groups of joined ports; every port of a laminate is in a group.
+    """Compare nets with groups of connected ports; every port of a laminate is in a group.
 
-    Ports not named by any net count as a net of one port, by its name. A port that lies in two
-    groups, as the inlet and the pocket of a chamber may, makes its net open.
+    A port that no net names counts as a net of one port, with its name. A port in two groups, such
+    as the inlet and pocket of a chamber, makes its net open.
     """
     home: dict[str, list[int]] = {}
     for number, part in enumerate(groups):
@@ -93,7 +94,7 @@ def read_netlist(path: Path) -> Netlist:
             return Netlist(parchmint_nets(document))
         except (LookupError, TypeError, AttributeError) as error:
             raise DesignError(
-                f"{path} has connections that are not ParchMint's ({error!r}); each has a layer, "
+                f"{path} has connections unknown to ParchMint ({error!r}); each has a layer, "
                 "and a source and sinks that name a component"
             ) from None
     raise DesignError(
@@ -105,21 +106,21 @@ def read_netlist(path: Path) -> Netlist:
 def _netlist(path: Path, document: dict[str, Any]) -> Netlist:
     tables = document.get("nets")
     if not isinstance(tables, dict) or not tables:
-        raise DesignError(f"{path}: nets must be an object of lists by name, and hold one or more")
+        raise DesignError(f"{path}: nets must be an object with at least one named list")
     ports: dict[str, Port] = {}
     nets: dict[str, tuple[str, ...]] = {}
     home: dict[str, str] = {}
     for net, rows in tables.items():
         if not isinstance(rows, list) or not rows:
-            raise DesignError(f"{path}: nets.{net} must be a list of ports, one or more")
+            raise DesignError(f"{path}: nets.{net} must be a list of at least one port")
         names = []
         for number, row in enumerate(rows):
             place = f"{path}: nets.{net}[{number}]"
             name, port = _member(place, row)
             if name in home:
                 raise DesignError(
-                    f"{place} names {name!r}, and so does nets.{home[name]}; a port belongs to "
-                    "one net, once"
+                    f"{place} names {name!r}, as does nets.{home[name]}; list each port once, in "
+                    "one net"
                 )
             home[name] = net
             names.append(name)
@@ -130,7 +131,7 @@ def _netlist(path: Path, document: dict[str, Any]) -> Netlist:
 
 
 def _member(place: str, row: Any) -> tuple[str, Port | None]:
-    """Return the name of a row, and its port if it states a place."""
+    """Return the name of a row, and its port if it states a position."""
     if isinstance(row, str):
         return row, None
     if not isinstance(row, dict) or not isinstance(row.get("name"), str):
@@ -140,7 +141,7 @@ def _member(place: str, row: Any) -> tuple[str, Port | None]:
     layers, at, kind = row.get("layers", []), row["at"], row.get("kind", "place")
     if not (_is_pair(layers, int) and _is_pair(at, int, float) and kind in get_args(PortKind)):
         raise DesignError(
-            f'{place} must have "at": [x, y], "layers": [below, above] and, if at all, '
+            f'{place} must have "at": [x, y], "layers": [below, above] and, optionally, '
             f'"kind": {" or ".join(get_args(PortKind))}'
         )
     below, above = layers
@@ -158,10 +159,10 @@ def _is_pair(values: Any, *kinds: type) -> bool:
 def parchmint_nets(document: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Return the nets of a ParchMint document, as ``sbafab import`` names them.
 
-    A component is a port by its id on every layer, with the layer's name if it is on several.
-    Connections join the components at their ends, on their layer; a VIA joins its layers.
-    Components on no such layer are not joined there. A component without a size, such as a NODE
-    where channels meet, joins them and is not a port itself.
+    A component is a port on every layer, named by its id, and by the layer's name if it is on
+    several. Connections join the components at their ends, on their layer; a VIA joins its layers.
+    Components are joined only on such layers. A component without a size, such as a NODE where
+    channels meet, joins them and is not a port.
     """
     labels = dict(parchmint_labels(document))
     titles, components = _titles(document), document.get("components", ())
@@ -195,7 +196,7 @@ def parchmint_labels(document: Mapping[str, Any]) -> dict[Spot, str]:
 
 
 def _titles(document: Mapping[str, Any]) -> dict[str, str]:
-    """The names of the layers with channels, by id."""
+    """Return the names of the layers with channels, by id."""
     return {
         row["id"]: row.get("name") or row["id"]
         for row in document.get("layers", ())

@@ -115,14 +115,14 @@ def write_3mf(surface: Surface, path: Path, material: str = "TPE") -> None:
 
 
 def _lines(pattern: str, rows: Floats | Ints, first: int | None = None) -> str:
-    """Rows of an array as text, numbered from ``first`` on if that is given."""
+    """Return rows of an array as text, numbered from ``first`` if given."""
     columns = rows.T.tolist()
     numbers = [] if first is None else [range(first, first + len(rows))]
     return "".join([pattern % row for row in zip(*numbers, *columns, strict=True)])
 
 
 def write_zip(path: Path, parts: Mapping[str, bytes]) -> None:
-    """Write an archive that is the same on every machine and day."""
+    """Write an archive that is the same on every machine at any date."""
     from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
     with ZipFile(path, "w") as archive:
@@ -147,7 +147,7 @@ def write_vtu(mesh: Mesh, path: Path) -> None:
 
     The cell field ``part`` counts films and bonds, or a shell's sections, from 1 in their order;
     node sets other than bonds are point fields of 0 and 1, face sets cell fields. The point field
-    ``rest`` is where nodes are in the flat laminate, if they are elsewhere.
+    ``rest`` gives the flat positions of nodes, if they differ.
     """
     of_nodes: dict[str, Field] = {**mesh.node_fields()}
     if mesh.rest is not None:
@@ -156,7 +156,7 @@ def write_vtu(mesh: Mesh, path: Path) -> None:
 
 
 def write_cavity_vtu(mesh: Mesh, cavity: str, path: Path) -> None:
-    """Write a cavity's surface; the point field ``node`` is the mesh's node, from 0."""
+    """Write a cavity's surface; the point field ``node`` is the mesh's node number, from 0."""
     surface, nodes = mesh.cavity(cavity)
     write_fields(path, "triangle", surface.points, surface.faces, {"node": nodes}, {})
 
@@ -242,7 +242,7 @@ MSH_ORDER = {
 def write_msh(mesh: Mesh, path: Path) -> None:
     """Write a mesh: films and bonds or sections, cavity walls of a volume, and node sets.
 
-    Bonds of films that lie on each other have no group: their nodes are shared.
+    Bonds of films that touch have no group: their nodes are shared.
     """
     groups: list[tuple[int, str]] = []
     blocks: list[tuple[int, int, Ints]] = []
@@ -331,11 +331,11 @@ def _listed(numbers: Ints) -> Iterable[str]:
 
 
 class MeshFormat(NamedTuple):
-    """A file ending, with the writing function for each content that the format can hold.
+    """A file suffix, with the writing function for each content that the format supports.
 
-    ``solid``: the flat solid, its film's material named. ``elements``: volume and shell meshes.
-    ``surface``: skins and cavities. ``cavity``: a chamber's cavity with the numbers of its nodes
-    in the mesh; written instead of ``surface``.
+    ``solid``: the flat solid with its film's material named. ``elements``: volume and shell meshes.
+    ``surface``: skins and cavities. ``cavity``: a chamber's cavity with the numbers of its nodes in
+    the mesh; written instead of ``surface``.
     """
 
     ending: str
@@ -364,7 +364,7 @@ def mesh_formats() -> tuple[MeshFormat, ...]:
 
 
 def conforming_endings() -> tuple[str, ...]:
-    """Return the file endings selectable by ``sbafab mesh --format``."""
+    """Return the file suffixes selectable by ``sbafab mesh --format``."""
     return tuple(row.ending for row in mesh_formats() if row.elements or row.surface or row.cavity)
 
 
@@ -399,8 +399,8 @@ def write_meshes(
 
     A laminate on a tube also gets ``mesh/solid_wrapped.*``, ``mesh/cavity_<chamber>_wrapped.stl``.
     ``folder`` is the output folder. ``progress`` is called with the number of files done and the
-    total. Return the files written, and the omitted ones with the reason: a surface that is open,
-    or whose volume is not the sum of area x thickness.
+    total. Return the written files, and the omitted ones with the reason: an open surface, or a
+    volume that is not the sum of area x thickness.
     """
     (folder / "mesh").mkdir(parents=True, exist_ok=True)
     wrap = tube_wrap(laminate)

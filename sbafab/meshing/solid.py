@@ -1,6 +1,7 @@
-"""The flat solid and cavities, made of prisms over a partition of the plane; and bent round a tube.
+"""The flat solid and cavities, made of prisms over a partition of the plane; also bent around a
+tube.
 
-Every edge of every region is an edge of the partition, so surfaces assembled from its cells meet
+Every edge of every region is an edge of the partition, so surfaces assembled from its cells match
 edge to edge.
 """
 
@@ -30,11 +31,11 @@ GRID = 1e-5
 
 
 class Partition(NamedTuple):
-    """Cells of the plane between the edges of some regions.
+    """Cells into which the edges of regions divide the plane.
 
-    ``points`` (n, 2) float64 in mm. ``edges`` (m, 2) int64 indices of points, each edge of each
-    cell with the cell on its left; ``cells`` (m,) the cell of an edge. ``inside`` (regions,
-    cells) bool: a mask of the cells of each region.
+    ``points`` (n, 2) float64 in mm. ``edges`` (m, 2) int64 are point indices, directed with their
+    cell on the left; an edge between two cells is listed once for each. ``cells`` (m,) is the cell
+    of an edge. ``inside`` (regions, cells) bool masks the cells of each region.
     """
 
     points: Floats
@@ -43,7 +44,7 @@ class Partition(NamedTuple):
     inside: Flags
 
     def boundary(self, chosen: Flags) -> Ints:
-        """Edges (k, 2) round the union of the chosen cells, the cells on their left."""
+        """Edges (k, 2) around the union of the chosen cells, with the cells on their left."""
         edges = self.edges[chosen[self.cells]]
         size = len(self.points)
         forth = edges[:, 0] * size + edges[:, 1]
@@ -54,7 +55,7 @@ class Partition(NamedTuple):
         return outline
 
     def triangles(self, chosen: Flags) -> Ints:
-        """Triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
+        """Return triangles (k, 3), counter-clockwise, that fill the union of the chosen cells."""
         from manifold3d import triangulate
 
         loops = loops_of(self.boundary(chosen))
@@ -66,7 +67,7 @@ class Partition(NamedTuple):
 
 
 def partition(regions: Sequence[Region], sagitta: float) -> Partition:
-    """The cells between all edges of the regions, arcs as chords within ``sagitta`` mm."""
+    """The cells between all edges of the regions, with arcs as chords within ``sagitta`` mm."""
     import shapely
 
     areas = [_polygons(region, sagitta) for region in regions]
@@ -86,7 +87,7 @@ def partition(regions: Sequence[Region], sagitta: float) -> Partition:
 
 
 def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
-    """The region with arcs as chords that enclose its area."""
+    """Return the region with arcs as chords that enclose its area."""
     import shapely
 
     pieces = []
@@ -101,7 +102,7 @@ def _polygons(region: Region, sagitta: float) -> shapely.MultiPolygon:
 
 
 def loops_of(edges: Ints) -> list[Ints]:
-    """Closed chains formed by the directed edges, none passing a point twice."""
+    """Return the closed chains formed by the directed edges, none through a point twice."""
     following: defaultdict[int, list[int]] = defaultdict(list)
     for tail, head in edges.tolist():
         following[tail].append(head)
@@ -142,18 +143,18 @@ class Slab(NamedTuple):
 
     @property
     def volume(self) -> float:
-        """Exact volume in mm3: area x thickness."""
+        """The exact volume in mm3: area x thickness."""
         return self.region.area * (self.top - self.bottom)
 
 
 def fuse(slabs: Sequence[Slab], sagitta: float, step: float = 0.0) -> Surface:
-    """The surface of the union of the slabs, built film by film from one partition of the plane.
+    """Return the surface of the union of the slabs, built film by film from one partition of the
+    plane.
 
-    Arcs become chords within ``sagitta`` mm of them, of equal area. Solid booleans are not needed:
-    walls stand on the outline of a level, and its difference from the level above or below is a
-    face. Faces are split every ``step`` mm of x, not at all if it is 0.
-    (manifold3d's booleans take ten times as long, and leave edges that single precision does not
-    tell apart.)
+    Arcs become chords of equal area within ``sagitta`` mm. Solid booleans are not needed: walls
+    stand on the outline of a level, and its difference from the level above or below is a face.
+    Faces are split every ``step`` mm of x, not at all if it is 0. (manifold3d's booleans take ten
+    times as long, and leave edges that coincide in single precision.)
     """
     regions = list(dict.fromkeys(slab.region for slab in slabs))
     strips = list(_strips(regions, step)) if step else []
@@ -182,26 +183,26 @@ def _strips(regions: Sequence[Region], step: float) -> Iterator[Region]:
 def closed_surface(name: str, slabs: Sequence[Slab], sagitta: float, step: float = 0.0) -> Surface:
     """Return the verified surface of the slabs; ``name`` names it in errors.
 
-    Raises OutputError if an edge does not join two triangles, or the volume is off.
+    Raises OutputError if an edge does not join two triangles, or the volume deviates.
     """
     surface = sealed(name, fuse(slabs, sagitta, step))
     expected = sum(slab.volume for slab in slabs)
     if not abs(surface.volume - expected) <= VOLUME_TOLERANCE * expected:
         raise OutputError(
-            f"The mesh of {name} holds {surface.volume:.4f} mm3 where its films add up to "
+            f"The mesh of {name} holds {surface.volume:.4f} mm3, but its films add up to "
             f"{expected:.4f} mm3."
         )
     return surface
 
 
 def sealed(name: str, surface: Surface) -> Surface:
-    """The surface itself. Raises OutputError if an edge does not join two triangles."""
+    """Return the surface itself. Raises OutputError if an edge does not join two triangles."""
     gaps = open_edges(surface)
     if len(gaps):
         x, y, z = gaps[0]
         raise OutputError(
             f"The mesh of {name} is not closed at {len(gaps)} edges, the first at x {x:.3f}, "
-            f"y {y:.3f}, z {z:.3f}; move profiles apart that touch in one point there."
+            f"y {y:.3f}, z {z:.3f}; separate profiles that touch in one point there."
         )
     return surface
 
@@ -287,10 +288,10 @@ def solid_slabs(laminate: Laminate) -> list[Slab]:
 
 
 def solid(laminate: Laminate, sagitta: float = SAGITTA, step: float = 0.0) -> Surface:
-    """The surface of the flat actuator, pockets, bores, inlet channels and lumen open.
+    """Return the surface of the flat actuator, with open pockets, bores, inlet channels and lumen.
 
     Its volume equals the sum over :func:`solid_slabs`. Faces are split every ``step`` mm of x.
-    Raises OutputError if it does not close.
+    Raises OutputError if it is not closed.
     """
     return closed_surface("the solid", solid_slabs(laminate), sagitta, step)
 
@@ -299,7 +300,7 @@ def solid(laminate: Laminate, sagitta: float = SAGITTA, step: float = 0.0) -> Su
 
 
 def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
-    """The chamber's pockets and its channels through walls and neck rings, bottom to top.
+    """Return the chamber's pockets and its channels through walls and neck rings, bottom to top.
 
     Raises OutputError if the chamber has no pocket, or a film between two of its pockets closes a
     channel.
@@ -329,10 +330,10 @@ def cavity_slabs(laminate: Laminate, chamber: Chamber) -> list[Slab]:
 
 
 def cavity(laminate: Laminate, chamber: Chamber, step: float = 0.0) -> Surface:
-    """The closed surface of a chamber's cavity, with normals that point out of it.
+    """Return the closed surface of a chamber's cavity, with outward normals.
 
     Its volume equals the sum over :func:`cavity_slabs`. Faces are split every ``step`` mm of x.
-    Raises OutputError if it does not close.
+    Raises OutputError if it is not closed.
     """
     name = f"the cavity of chamber {chamber.name}"
     return closed_surface(name, cavity_slabs(laminate, chamber), SAGITTA, step)
@@ -341,7 +342,7 @@ def cavity(laminate: Laminate, chamber: Chamber, step: float = 0.0) -> Surface:
 def _pocket(
     interface: Interface, centres: Sequence[Point], axes: Sequence[Point]
 ) -> Iterator[Contour]:
-    """The unbonded pieces round the centres, open where a channel passes through them."""
+    """Return the unbonded pieces around the centres, open where a channel passes through them."""
     void = interface.unbonded
     if interface.folds:
         void -= folded_strips(interface)
@@ -362,7 +363,7 @@ def _pocket(
 def _channels(
     laminate: Laminate, chamber: Chamber, axes: Sequence[Point], pockets: Sequence[Slab]
 ) -> Iterator[Slab]:
-    """The openings on the chamber's axes through the bonded films between its pockets."""
+    """Return the openings on the chamber's axes through the bonded films between its pockets."""
     low, high = pockets[0].top, pockets[-1].bottom
     slabs = [(f"layer {layer.index}", film_slab(layer)) for layer in laminate.tpe_layers]
     slabs += [
@@ -377,7 +378,7 @@ def _channels(
             if not holes:
                 raise OutputError(
                     f"The channel of chamber {chamber.name} is closed at {name}, "
-                    f"x {x:.3f}, y {y:.3f}; cut a bore there with a neck ring round it."
+                    f"x {x:.3f}, y {y:.3f}; cut a bore there with a neck ring around it."
                 )
             # The area of a hole is negative: this is the smallest.
             smallest = max(holes, key=lambda hole: hole.area)
@@ -387,7 +388,7 @@ def _channels(
 def _holes_between(
     laminate: Laminate, _chamber: Chamber, _axes: Sequence[Point], pockets: Sequence[Slab]
 ) -> Iterator[Slab]:
-    """The holes of films that open to a pocket below and to one above."""
+    """Return the holes of films that open to a pocket below and to one above."""
     for film in map(film_slab, laminate.tpe_layers):
         below = [pocket.region for pocket in pockets if math.isclose(pocket.top, film.bottom)]
         above = [pocket.region for pocket in pockets if math.isclose(pocket.bottom, film.top)]
@@ -408,10 +409,10 @@ Numbers = Floats | float
 
 
 class TubeWrap(NamedTuple):
-    """Placement of a flat body round a tube, whose axis is z.
+    """Placement of a flat body around a tube with axis z.
 
-    ``radius`` is the tube's; lengths ``neutral`` mm above it are kept. An overlapping sheet is
-    raised by ``thickness`` at and past x = ``seam``. All mm.
+    ``radius`` is the tube's; lengths ``neutral`` mm above it are preserved. An overlapping sheet is
+    raised by ``thickness`` at and beyond x = ``seam``. All in mm.
     """
 
     radius: float
@@ -421,14 +422,15 @@ class TubeWrap(NamedTuple):
 
     @property
     def step(self) -> float:
-        """Distance in mm of the lines along the tube at which facets of a body are cut."""
+        """The distance in mm between the lines along the tube at which facets of a body are cut."""
         return math.sqrt(8 * self.radius * BENT_SAGITTA)
 
     def placed(self, points: Floats, middle: Numbers = 0.0, share: Numbers = 1.0) -> Floats:
-        """Points (n, 3) of the flat laminate, z from the tube's surface, round the tube.
+        """Return points (n, 3) of the flat laminate, with z from the tube's surface, around the
+        tube.
 
-        A body fixed at x = ``middle`` may be bent by a ``share`` of the tube's curvature: 0 leaves
-        it straight, on the tangent. Both may be given for each point.
+        A body fixed at x = ``middle`` may be bent by a fraction ``share`` of the tube's curvature:
+        0 leaves it straight, on the tangent. Both may be given for each point.
         """
         x, y, z = points.T
         at, bend = middle / (self.radius + self.neutral), share / self.radius
@@ -442,17 +444,17 @@ class TubeWrap(NamedTuple):
         return np.column_stack([out * cos - aside * sin, out * sin + aside * cos, y])
 
     def lean(self, x: Floats, middle: Numbers = 0.0, share: Numbers = 1.0) -> Floats:
-        """Angle in radians round the tube of the upright of a body at x."""
+        """Return the angle in radians around the tube of the normal of a body at x."""
         at, bend = middle / (self.radius + self.neutral), share / self.radius
         return bend * (x - middle) / (1 + bend * self.neutral) + at
 
     def raised(self, x: Floats) -> Floats:
-        """Height in mm by which the sheet is lifted by its overlapping end."""
+        """Return the height in mm by which the sheet is lifted by its overlapping end."""
         return self.thickness * np.clip((x - self.seam) / RAMP + 1, 0, 1)
 
 
 def tube_wrap(laminate: Laminate) -> TubeWrap | None:
-    """Return the placement of a laminate round its tube, or None for one without a tube."""
+    """Return the placement of a laminate around its tube, or None for one without a tube."""
     if laminate.tube is None:
         return None
     sheet = laminate.tpe_layers[0]
@@ -465,12 +467,12 @@ def tube_wrap(laminate: Laminate) -> TubeWrap | None:
 
 
 def wrapped(surface: Surface, wrap: TubeWrap) -> Surface:
-    """The surface of a flat body, already cut every ``wrap.step``, wrapped round its tube."""
+    """The surface of a flat body, already cut every ``wrap.step``, wrapped around its tube."""
     x, y, z = surface.points.T
     return Surface(wrap.placed(np.column_stack([x, y, z + wrap.raised(x)])), surface.faces)
 
 
 def bent_point(p: Vector, radius: float) -> Vector:
-    """Return where a point of a flat body lies round a tube of this radius about z."""
+    """Return the position of a point of a flat body around a tube of this radius about z."""
     x, y, z = TubeWrap(radius).placed(np.array([p]))[0].tolist()
     return x, y, z

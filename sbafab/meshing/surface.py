@@ -33,12 +33,12 @@ class Surface:
 
     @cached_property
     def volume(self) -> float:
-        """Enclosed volume in mm3."""
+        """The enclosed volume in mm3."""
         a, b, c = self.points.take(self.faces.T, axis=0)
         return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
     def trimesh(self) -> trimesh.Trimesh:
-        """Return the surface for trimesh, its points and faces in the same order."""
+        """Return the surface for trimesh, with its points and faces in the same order."""
         import trimesh
 
         return trimesh.Trimesh(self.points, self.faces, process=False)
@@ -52,7 +52,8 @@ class Surface:
 
 
 def open_edges(surface: Surface) -> Floats:
-    """Midpoints (k, 3) in mm of the edges that do not join exactly two consistently oriented faces.
+    """Return midpoints (k, 3) in mm of the edges that do not join exactly two consistently oriented
+    faces.
 
     Points are merged as in a single-precision file. Empty for a watertight surface.
     """
@@ -64,8 +65,8 @@ def open_edges(surface: Surface) -> Floats:
 
 
 def unpaired_edges(faces: Ints) -> Ints:
-    """Indices, of all corners of faces (m, 3) in a row, at which an edge starts that does not join
-    exactly two consistently oriented faces.
+    """Return the indices, in the flattened corners of faces (m, 3), at which an edge starts that
+    does not join exactly two consistently oriented faces.
     """
     size = int(faces.max(initial=0)) + 1
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
@@ -83,7 +84,7 @@ def unpaired_edges(faces: Ints) -> Ints:
 
 
 def _merged(points: Floats) -> Ints:
-    """A number for each point (n,), equal for points that coincide in single precision."""
+    """Return a number for each point (n,), equal for points that coincide in single precision."""
     # Compare the bits of four-byte numbers; adding 0 turns -0 into 0.
     x, y, z = (points.astype(np.float32) + np.float32(0)).view(np.uint32).T.astype(np.uint64)
     half = np.uint64(32)

@@ -1,6 +1,6 @@
-"""Mechanics: what an actuator will do.
+"""Mechanics: the predicted behaviour of an actuator.
 
-In: a ``Design`` with its laminate, pressures and calibrated factors. Out: balloons, their maps and
-a ``Stack`` in equilibrium; a ``Prediction`` of figures, each with its quantity, conditions, model,
-validity and interval.
+Input: a ``Design`` with its laminate, pressures and calibrated factors. Output: balloons, their
+maps and a ``Stack`` in equilibrium; a ``Prediction`` of figures, each with its quantity,
+conditions, model, validity and interval.
 """

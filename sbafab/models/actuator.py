@@ -1,8 +1,8 @@
-"""The actuator of a design as input of the models, and the discs that stand for drawn pockets.
+"""The actuator of a design as input of the models, and the discs that approximate drawn pockets.
 
-A drawn pocket contains every disc within it and lies in every disc round it: part of its films is
-bonded where the outer disc's are free, and free where the inner disc's are bonded. The figures of
-both discs, round the chamber's axis, therefore bound the pocket's, because a wider pocket rises
+A drawn pocket contains every inscribed disc and lies in every circumscribed disc: part of its films
+is bonded where the outer disc's are free, and free where the inner disc's are bonded. The figures
+of both discs, about the chamber's axis, therefore bound the pocket's, because a wider pocket rises
 more and pushes harder.
 """
 
@@ -36,7 +36,7 @@ axis: its stroke, in proportion to the diameter, is then known to some 10 % eith
 
 @dataclass(frozen=True)
 class Actuator:
-    """A design with its laminate at factors; ``drawn_as`` replaces its form."""
+    """A design with its laminate and calibration factors; ``drawn_as`` replaces its form."""
 
     design: Design
     laminate: Laminate
@@ -45,12 +45,12 @@ class Actuator:
 
     @property
     def form(self) -> Form:
-        """The form that models take."""
+        """The form used by the models."""
         return self.drawn_as or self.design.form
 
     @property
     def balloons(self) -> int:
-        """Balloons in each of the stacks, which work side by side."""
+        """The balloons in each of the stacks, which act in parallel."""
         return self.design.stack.balloons
 
     @cached_property
@@ -80,15 +80,15 @@ class Actuator:
 
     @property
     def reference_stroke(self) -> float:
-        """The stroke in mm to which shares refer: the paper's measurement, scaled, or for oblong
-        pockets that of their largest volume.
+        """The stroke in mm that is the reference for shares: the paper's measurement, scaled, or
+        for oblong pockets that of their largest volume.
         """
         return scaled_stroke(self.radii) if self.radii else self.pockets[0].largest_stroke
 
     @property
     def reference_height(self) -> float:
-        """The height in mm at the reference stroke; the paper divides its whole height by its
-        balloons (Sec. 4.6: 1.2 mm each).
+        """The height in mm at the reference stroke, per balloon; the paper divides its whole height
+        by its balloons (Sec. 4.6: 1.2 mm each).
         """
         return self.reference_stroke + (0.0 if self.radii else self.thickness)
 
@@ -98,12 +98,12 @@ class Actuator:
         return self.thickness + stroke * rise / self.reference_stroke
 
     def stroke_at(self, share: float) -> float:
-        """Return the stroke in mm at a share of the way from flat to the reference height."""
+        """Return the stroke in mm at a fraction of the way from flat to the reference height."""
         return max(share * (self.reference_height - self.thickness), 0.0)
 
     @property
     def axes(self) -> list[Point]:
-        """Centres of the chambers of a lobed actuator."""
+        """The centres of the chambers of a lobed actuator."""
         return [chamber.centres[0] for chamber in self.laminate.chambers]
 
     @property
@@ -118,7 +118,7 @@ class Actuator:
 
     def is_like_paper(self, stacks: int, radius: float) -> bool:
         """Return True if the paper measured this number of stacks of such balloons on common
-        plates: its 1-DoF actuators have one, its 3-DoF actuator three.
+        plates: one in its 1-DoF actuators, three in its 3-DoF actuator.
         """
         return (
             self.has_the_papers_film
@@ -129,8 +129,8 @@ class Actuator:
 
 
 class NearDiscs(NamedTuple):
-    """Diameters in mm of the disc of ``equal`` area, and of those within and round a pocket, about
-    its chamber's axis.
+    """Diameters in mm of the disc of ``equal`` area, and of the inscribed and circumscribed discs
+    of a pocket, about its chamber's axis.
     """
 
     equal: float
@@ -160,7 +160,7 @@ def near_discs(design: Design) -> NearDiscs | None:
 
 
 def model_form(design: Design) -> Form:
-    """Return the form as models take it: with discs where drawn pockets are nearly round."""
+    """Return the form used by the models, with discs in place of nearly round drawn pockets."""
     discs = near_discs(design) if isinstance(design.form.pockets, Drawn) else None
     return discs.form(design, discs.equal) if discs and discs.is_round else design.form
 

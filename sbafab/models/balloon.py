@@ -82,13 +82,13 @@ class Balloon:
     """The second film if the two differ: of the same sizes, and without a mate itself."""
 
     def stiffened(self, ratio: float) -> Balloon:
-        """Return the balloon whose films have ``ratio`` times the modulus."""
+        """Return the balloon with the modulus of its films multiplied by ``ratio``."""
         mate = None if self.mate is None else self.mate.stiffened(ratio)
         return replace(self, modulus=ratio * self.modulus, mate=mate)
 
     @cached_property
     def nodes(self) -> Array:
-        """Radii of the flat film's nodes, mm, closer together at neck and rim, where it bends."""
+        """The radii of the flat film's nodes, mm, closer at neck and rim, where it bends."""
         even = np.linspace(0, 1, FILM_ELEMENTS + 1)
         close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
         film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
@@ -99,12 +99,12 @@ class Balloon:
 
     @property
     def neck_edge(self) -> int:
-        """Number of the node at the neck's edge; 0, the pole, without a neck."""
+        """The number of the node at the neck's edge; 0, the pole, without a neck."""
         return NECK_ELEMENTS if self.neck else 0
 
     @property
     def edge(self) -> int:
-        """Number of the node at the pocket's edge."""
+        """The number of the node at the pocket's edge."""
         return self.neck_edge + FILM_ELEMENTS
 
     @cached_property
@@ -125,7 +125,7 @@ class Balloon:
 
     @cached_property
     def node_areas(self) -> Array:
-        """Area in mm2 that belongs to each node, 0 outside the pocket: (nodes, 1)."""
+        """The area in mm2 of each node, 0 outside the pocket: (nodes, 1)."""
         areas = math.tau * self.nodes * np.gradient(self.nodes)
         return np.asarray(np.where(np.arange(len(areas)) < self.edge, areas, 0.0)[:, None])
 
@@ -136,7 +136,7 @@ class Balloon:
 
     @property
     def bending_stiffness(self) -> float:
-        """Bending stiffness B of one film in kPa mm3."""
+        """The bending stiffness B of one film in kPa mm3."""
         if self.inextensible:
             return 0.0
         return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
@@ -175,8 +175,9 @@ class Shapes(NamedTuple):
 
 
 class BalloonLoad(NamedTuple):
-    """Pressure, half the height between the plates, both (rows,); the hoop stress that wrinkles
-    carry, ``cap`` (elements, rows); whether plates hold the necks (``tied``); the rim's ripple.
+    """Pressure and half the height between the plates, both (rows,); ``cap``, the hoop stress
+    carried by wrinkles (elements, rows); whether plates hold the necks (``tied``); the rim's
+    ripple.
     """
 
     pressure: Array
@@ -196,13 +197,13 @@ class BalloonLoad(NamedTuple):
 def inflate(
     balloon: Balloon, pressure: ArrayLike, height: ArrayLike | None = None, tied: bool = False
 ) -> Shapes:
-    """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm);
-    of two films ``r`` and ``z`` are those of the one that stretches more easily.
+    """Return the equilibrium shapes at pressures (kPa), free or between plates at heights (mm); for
+    two films ``r`` and ``z`` are those of the more compliant one.
 
     The air in the bore of a free balloon pulls on it, as in a stack. With ``tied`` the plates hold
-    its necks, and pull if they stand higher than it would rise; the force is then below 0. Raises
-    DesignError for pressures or heights that are not above 0 (a tied one may have no pressure), or
-    if Newton's method finds no equilibrium.
+    its necks, and pull if they are farther apart than its free height; the force is then negative.
+    Raises DesignError for pressures or heights that are not above 0 (a tied balloon may have no
+    pressure), or if Newton's method finds no equilibrium.
     """
     p = np.atleast_1d(np.asarray(pressure, dtype=float))
     high = math.inf if height is None else np.asarray(height, dtype=float)
@@ -236,7 +237,7 @@ def inflate(
 
 
 def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y: Array) -> Shapes:
-    """Return the shapes at freedoms (freedoms, rows); one film stands for two."""
+    """Return the shapes at freedoms (freedoms, rows); one film represents two."""
     shapes, both = motion.shapes(y), 2 / len(films)
     height = volume = force = np.zeros(y.shape[1])
     energy = motion.twist @ y**2 / 2
@@ -252,8 +253,8 @@ def _shapes(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion, y
 
 
 def initial_shape(balloon: Balloon, load: BalloonLoad) -> Array:
-    """Return the coordinates of films to start from: bulged, as high as their pressure could lift
-    them, or cones if plates pull them higher: (coordinates, rows).
+    """Return the initial coordinates of films: bulged, as high as their pressure could lift them,
+    or cones if plates pull them higher: (coordinates, rows).
     """
     flat, free = balloon.nodes, balloon.pocket - balloon.neck
     rise = 0.3 * free * np.cbrt(load.pressure * balloon.pocket / (balloon.modulus * 0.0025))
@@ -289,7 +290,7 @@ class TotalEnergy(NamedTuple):
 
 
 def coordinates(r: Array, z: Array) -> Array:
-    """Return the coordinates r, z of each node in turn, (coordinates, rows), of radii and heights
+    """Return the coordinates r, z of each node in turn, (coordinates, rows), from radii and heights
     (rows, nodes).
     """
     return np.stack([r.T, z.T], 1).reshape(-1, len(r))
@@ -331,12 +332,15 @@ FilmPair = tuple["Balloon", ...]
 
 
 class FilmMotion(NamedTuple):
-    """Motion of films by a unit of each degree of freedom: ``bases`` (films, coordinates,
-    freedoms), whose pseudoinverse is ``inverse``; the index map from their tangent stiffness to its
-    band; and the stiffness ``twist`` of each freedom by the rim's twist.
+    """Motion of films per unit of each degree of freedom.
+
+    ``bases`` (films, coordinates, freedoms) has the pseudoinverse ``inverse``; with the index map
+    from their tangent stiffness to its band, and ``twist``, the stiffness of each freedom due to
+    the rim's twist.
 
     Heights of the neck are one freedom, so that it stays level. Two films share the rim, which
-    moves until their pulls balance and tilts as they twist it, like a ring whose section turns.
+    moves until their tensions balance and tilts as they twist it, like a ring whose section
+    rotates.
     """
 
     bases: Array
@@ -352,8 +356,9 @@ class FilmMotion(NamedTuple):
 @lru_cache(maxsize=64)
 def _motion(films: FilmPair, is_free: bool) -> FilmMotion:
     """Return the motion of films by their own freedoms, coordinate by coordinate, then the rim's:
-    its radii and, of two films, its tilt and its height. A free balloon's rim stays in its plane:
-    its overall height is fixed.
+    its radii and, for two films, its tilt and height.
+
+    A free balloon's rim stays in its plane: its overall height is fixed.
     """
     balloon, several = films[0], len(films)
     nodes = np.arange(balloon.edge)
@@ -417,7 +422,7 @@ def _balanced(films: FilmPair, loads: Sequence[BalloonLoad], motion: FilmMotion,
 
 
 def relative_change(x: Array, ahead: Array) -> Array:
-    """Return the largest share of its length by which a step changes an element: (rows,)."""
+    """Return the largest relative change of length of an element in a step: (rows,)."""
     length, by = (np.hypot(y[2::2] - y[:-2:2], y[3::2] - y[1:-2:2]) for y in (x, ahead))
     return np.asarray((by / length).max(0))
 
@@ -478,10 +483,10 @@ GAUSS_POINTS = 5
 
 
 class Ripple(NamedTuple):
-    """Ripple of one film's rim, rows last.
+    """A ripple of one film's rim, rows last.
 
-    ``waves`` round the rim; ``cost`` is K / 2, infinite for a smooth rim; ``pull`` each element's
-    volume times modulus times rho, and ``stiff`` the integral of E rho^2.
+    ``waves`` around the rim; ``cost`` is K / 2, infinite for a smooth rim; ``pull`` is each
+    element's volume times modulus times rho, and ``stiff`` the integral of E rho^2.
     """
 
     waves: Array
@@ -495,9 +500,10 @@ class Ripple(NamedTuple):
 
 def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]) -> list[Ripple]:
     """Return the ripples of least energy at the rim's hoop strains (elements, rows), one part per
-    film; ``tensions`` in N/m are the films' tensions at the pocket's edge, one row per film.
+    film.
 
-    One film represents two equal ones.
+    ``tensions`` in N/m are the films' tensions at the pocket's edge, one row per film. One film
+    represents two equal ones.
     """
     pair = films[0], films[-1]
     roots = sum(
@@ -520,7 +526,7 @@ def rim_ripples(films: Sequence[Balloon], hoop: Array, tensions: Sequence[Array]
 
 @lru_cache(maxsize=64)
 def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array]:
-    """Return, by number of waves: half the cost of bending; each element's area times its mean rho;
+    """Return, by number of waves: half the bending cost; each element's area times its mean rho;
     and the integral of E rho^2 over both films.
     """
     balloon = pair[0]
@@ -540,7 +546,7 @@ def _rim_modes(pair: tuple[Balloon, Balloon]) -> tuple[Array, Array, Array]:
 
 
 def bonded_bending_stiffness(pair: Sequence[Balloon]) -> float:
-    """Return the bending stiffness in kPa mm3 of both films bonded, as a strip free to narrow."""
+    """Return the bending stiffness in kPa mm3 of both bonded films, as a strip free to narrow."""
     (e1, t1), (e2, t2) = ((film.modulus, film.thickness) for film in pair)
     mixed = e1 * e2 * t1 * t2 * (4 * t1**2 + 6 * t1 * t2 + 4 * t2**2)
     return (e1**2 * t1**4 + e2**2 * t2**4 + mixed) / (12 * (e1 * t1 + e2 * t2))

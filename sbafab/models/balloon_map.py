@@ -1,12 +1,12 @@
 """One balloon as a smooth map: its volume and its force, at any pressure and height.
 
-Both come from one potential, the films' energy less the work of the air: force -dW/dh, volume
+Both come from one potential, the films' energy minus the work of the air: force -dW/dh, volume
 -dW/dp. It is a quintic spline in the height and in asinh(p / p0), fitted by least squares to W and
 both derivatives of balloons between plates, and to free ones. The map therefore conserves energy:
 no cycle of pressure and height yields or consumes work. A balloon of least energy holds more at a
 higher pressure, and pushes less at a greater height (W is concave in p, convex in h). The map is
-the spline nearest to the balloons whose Bernstein coefficients guarantee this, with volumes above 0
-and at most what balloons hold at the pressure, so it holds everywhere on the map by construction.
+the nearest spline to the balloons whose Bernstein coefficients guarantee this, with volumes above 0
+and at most those of balloons at the pressure, so it is true everywhere on the map by construction.
 Lengths mm, pressures kPa, volumes ul, forces mN, energies uJ.
 """
 
@@ -112,9 +112,11 @@ ABOVE = np.stack([POWERS**0, POWERS, POWERS * (POWERS - 1) / 2])
 
 @dataclass(frozen=True, eq=False)
 class BalloonMap:
-    """The map of one balloon from no pressure to ``most_pressure`` kPa and from flat to
-    ``most_height`` mm; ``coefficients`` are the potential's, in height and in
-    asinh(p / ``scale_pressure``). ``base`` is the map that this one was ``stiffened`` from.
+    """The map of one balloon from zero to ``most_pressure`` kPa and from flat to ``most_height``
+    mm.
+
+    ``coefficients`` are the potential's, in height and in asinh(p / ``scale_pressure``). ``base``
+    is the map from which this one was ``stiffened``.
     """
 
     balloon: Balloon
@@ -125,10 +127,10 @@ class BalloonMap:
     base: BalloonMap | None = None
 
     def stiffened(self, ratio: float) -> BalloonMap:
-        """Return the map of the balloon whose films have ``ratio`` times the modulus.
+        """Return the map of the balloon with the modulus of its films multiplied by ``ratio``.
 
-        Energies are proportional to the modulus at equal pressure over modulus:
-        W(ratio E; p, h) = ratio W(E; p / ratio, h). The map reaches ``ratio`` times the pressure.
+        Energies are proportional to the modulus at equal pressure over modulus: W(ratio E; p, h) =
+        ratio W(E; p / ratio, h). The map then extends to ``ratio`` times the pressure.
         """
         if ratio == 1:
             return self
@@ -158,12 +160,12 @@ class BalloonMap:
 
     @cached_property
     def spans(self) -> float:
-        """Pieces of the spline per mm of height."""
+        """The pieces of the spline per mm of height."""
         return HEIGHT_SPANS / self.most_height
 
     @cached_property
     def _by_pressure(self) -> Array:
-        """Polynomials by height of each coefficient: (powers x pieces, coefficients)."""
+        """The polynomials in height of each coefficient: (powers x pieces, coefficients)."""
         rows = pieces(self.coefficients).transpose(2, 1, 0)
         return np.ascontiguousarray(rows.reshape(-1, rows.shape[-1]))
 
@@ -171,9 +173,9 @@ class BalloonMap:
         """Return the polynomials by height of W, of -dW/dp (the volume) and of the volume's rate by
         pressure, the first ``orders`` of these, at pressures: (powers, pieces, orders, ...).
 
-        With ``sucked`` pressures may be below 0, as in a shut chamber that is pulled open: slack
-        films cave in, their volume falls by exp(p / COLLAPSE_SUCTION). Raises DesignError for a
-        pressure outside the map.
+        With ``sucked`` pressures may be below 0, as in a closed chamber that is pulled open: slack
+        films collapse, and their volume falls by exp(p / COLLAPSE_SUCTION). Raises DesignError for
+        a pressure outside the map.
         """
         below = np.asarray(pressure, dtype=float)
         p = np.maximum(below, 0.0) if sucked else below
@@ -202,13 +204,13 @@ class BalloonMap:
         return np.asarray(found.reshape(DEGREE + 1, PIECES_IN_ALL, orders, *p.shape))
 
     def scaled(self, p: Array) -> tuple[Array, Array]:
-        """Return the coordinate in pieces of the spline at pressures, and its rate by pressure."""
+        """Return the coordinate in pieces of the spline at pressures, and its derivative."""
         each = PRESSURE_SPANS / math.asinh(self.most_pressure / self.scale_pressure)
         x = np.minimum(np.arcsinh(p / self.scale_pressure) * each, PRESSURE_SPANS * (1 - 1e-12))
         return x, each / np.hypot(p, self.scale_pressure)
 
     def force(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """Return the force in mN on the plate at either end; below 0 for a pull."""
+        """Return the force in mN on the plate at either end; negative for a pull."""
         return -self._along(0, pressure, height)[1] * self.spans
 
     def volume(self, pressure: ArrayLike, height: ArrayLike) -> Array:
@@ -216,11 +218,11 @@ class BalloonMap:
         return self._along(1, pressure, height)[0]
 
     def potential(self, pressure: ArrayLike, height: ArrayLike) -> Array:
-        """Return the energy of the films less pressure times volume, uJ."""
+        """Return the energy of the films minus pressure times volume, uJ."""
         return self._along(0, pressure, height)[0]
 
     def _along(self, which: int, pressure: ArrayLike, height: ArrayLike) -> tuple[Array, ...]:
-        """Return one of ``splines`` and its rate by height, in pieces."""
+        """Return one of ``splines`` and its derivative with respect to height, in pieces."""
         p, h = np.broadcast_arrays(np.asarray(pressure, float), np.asarray(height, float))
         table = self.splines(p)[:, :, which].reshape(DEGREE + 1, -1)
         return horner(table, np.arange(p.size).reshape(p.shape), h * self.spans, p.size)
@@ -248,7 +250,7 @@ class BalloonMap:
 
 
 def refuse_outside(pressures: Array, most_pressure: float) -> None:
-    """Raise DesignError for pressures in kPa below 0 or above the most, which itself is inside.
+    """Raise DesignError for pressures in kPa below 0 or above the maximum, which itself is inside.
 
     It stays inside even if asinh and sinh, or a film's modulus, round it up.
     """
@@ -262,7 +264,8 @@ def refuse_outside(pressures: Array, most_pressure: float) -> None:
 
 
 def pieces(coefficients: Array) -> Array:
-    """Polynomials of splines by height: (..., coefficients) become (..., PIECES_IN_ALL, powers).
+    """Return polynomials of splines in height: (..., coefficients) become (..., PIECES_IN_ALL,
+    powers).
 
     The first extends below the spline and the last above it, with the second derivative there.
     """
@@ -280,7 +283,7 @@ def horner(
     """Return splines (powers, rows) at heights ``y``, in pieces: their values, and their first and
     second derivatives unless these are left out as 0.
 
-    ``which`` is the row of each spline's first piece; its next one is ``stride`` rows on.
+    ``which`` is the row of each spline's first piece; the next one is ``stride`` rows later.
     """
     # Pieces are counted from the one below the spline.
     after = y + 1.0
@@ -372,15 +375,15 @@ def _fitted(frame: BalloonMap, shapes: Shapes, h: Array, free: Shapes) -> Array:
     best = nearest_admissible(np.linalg.solve(normal, matrix.T @ right_side), normal, limits)
     if best is None:
         raise DesignError(
-            f"no smooth map of a balloon fits up to {frame.most_pressure:g} kPa; ask for less "
-            "pressure"
+            f"no smooth map of the balloon was found up to {frame.most_pressure:g} kPa; lower "
+            "the pressure"
         )
     return np.asarray((units * best).reshape(frame.coefficients.shape))
 
 
 def _rows(frame: BalloonMap, p: Array, h: Array, by_p: int, by_h: int) -> Array:
-    """Return W, or the volume or the force as its negative derivative by pressure or by height, at
-    places (n,) as a matrix by coefficients: (n, coefficients).
+    """Return W, or the volume or force as its negative derivative with respect to pressure or
+    height, at places (n,) as a matrix by coefficients: (n, coefficients).
     """
     x, rate = frame.scaled(p)
     y = np.minimum(h * frame.spans, HEIGHT_SPANS * (1 - 1e-12))
@@ -439,7 +442,10 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> It
     height, as shares of area times height. Forces fall with height, as shares of pressure times
     area.
 
-    The limits apply to Bernstein coefficients, so that they also hold between places.
+    Volumes rise with pressure, are positive without pressure, and at the end of each piece are at
+    most the largest volume ``held`` at the next of ``pressures`` at any height, as fractions of
+    area times height. Forces fall with height, as fractions of pressure times area. The limits
+    apply to Bernstein coefficients, so that they also hold between places.
     """
     top, scale_pressure = frame.most_height, frame.scale_pressure
     each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
@@ -472,7 +478,7 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> It
 
 
 def _joined(parts: Array) -> Array:
-    """List the coefficients of all parts; coefficients shared by two parts appear once."""
+    """Return the coefficients of all parts; those shared by two parts appear once."""
     return np.concatenate([parts[:, :-1].reshape(-1, parts.shape[-1]), parts[-1, -1:]])
 
 

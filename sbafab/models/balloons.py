@@ -19,7 +19,7 @@ LEAST_RATIO, LEAST_RADIUS = 1.1, 0.1
 
 
 def has_balloons(form: Form) -> bool:
-    """Return True if the elastic model covers such pockets: round ones on flat plates."""
+    """Return True if the elastic model covers such pockets: round pockets on flat plates."""
     return isinstance(form.pockets, Discs) and form.wrap is None
 
 
@@ -31,8 +31,8 @@ def balloons_of(
 ) -> list[Balloon]:
     """Return the balloons of one chamber, bottom to top, all treated as inner ones.
 
-    ``form`` replaces the design's. ``factors`` may make the pockets smaller than drawn, and replace
-    the film's modulus. Raises DesignError if pockets are not round, or for films of unknown
+    ``form`` replaces the design's. ``factors`` may reduce the pockets from their drawn size, and
+    replace the film's modulus. Raises DesignError if pockets are not round, or for films of unknown
     modulus.
     """
     form = form or design.form

@@ -1,12 +1,12 @@
-"""A calibration: the posterior of the models' unknowns with the discrepancy that remains, as a file
+"""A calibration: the posterior of the models' unknowns and the remaining discrepancy, as a file
 that designs and kits name; the factors of a design, and the 90 % intervals of its predictions.
 
-Unknowns have a normal posterior in their coordinates, for an actuator of which nothing was
-measured: its pocket loss differs from pressing to pressing. A prediction is linear in them: its
-logarithm, or the prediction itself where it may be 0 or below, changes by its slope times the
-change of each unknown. What the models miss beyond that is a relative discrepancy, one standard
-deviation for each group of quantities; farther from the evidence of a group, in size, film or
-number of balloons, more is assumed to be missed.
+Unknowns have a normal posterior in their coordinates, for an actuator without measurements: its
+pocket loss differs between pressings. A prediction is linear in them: its logarithm, or the
+prediction itself where it may be 0 or below, changes by its slope times the change of each unknown.
+The remaining model error is a relative discrepancy, one standard deviation for each group of
+quantities; farther from the evidence of a group, in size, film or number of balloons, a larger
+error is assumed.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ Ends = tuple[float, float]
 
 
 class Unknown(NamedTuple):
-    """One unknown of the models; ``field`` names the field of ``Factors``.
+    """An unknown of the models; ``field`` names the field of ``Factors``.
 
     The prior is normal in the coordinate, which is the logarithm of the value (``is_log``) or the
     value itself: ``middle`` is the value at its mean, ``spread`` its standard deviation in the
@@ -126,8 +126,8 @@ _Texts = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class SizeRange(Section):
-    """Least and largest diameter of round pockets and thickness of films that bond, mm, and number
-    of balloons in a stack: of an actuator, or of several.
+    """The range of diameters of round pockets and thicknesses of films that bond, mm, and of
+    numbers of balloons in a stack, for one actuator or several.
     """
 
     diameters: _Range | None = None
@@ -144,7 +144,7 @@ class SizeRange(Section):
         )
 
     def joined(self, other: SizeRange) -> SizeRange:
-        """Return the sizes of both."""
+        """Return the union of both ranges."""
         ends: dict[str, Any] = {}
         for name, mine in self:
             both = [each for each in (mine, getattr(other, name)) if each is not None]
@@ -152,7 +152,7 @@ class SizeRange(Section):
         return SizeRange.model_construct(**ends)
 
     def farther(self, evidence: SizeRange, is_other_film: bool = False) -> float:
-        """Return the relative standard deviation that is assumed for sizes off the evidence."""
+        """Return the relative standard deviation assumed for sizes outside the evidence."""
         missed = [OTHER_FILM if is_other_film else 0.0]
         for name, rate in PER_DOUBLING.items():
             of, evidence_range = getattr(self, name), getattr(evidence, name)
@@ -180,8 +180,8 @@ def flags_at(missed: float) -> tuple[Flag, ...]:
 
 
 def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[Ends, float]:
-    """Return the interval in kPa that holds the burst pressure with a probability of ``share``, and
-    the relative standard deviation that is assumed in it.
+    """Return the interval in kPa that contains the burst pressure with a probability of ``share``,
+    and the relative standard deviation assumed in it.
     """
     evidence = SizeRange.of([2 * RADIUS], [PAPER_THICKNESS], 1)
     sizes = SizeRange.of([2 * estimate.radius], [estimate.thickness], 1)
@@ -195,23 +195,24 @@ def burst_uncertainty(estimate: Burst, share: float = SHARE) -> tuple[Ends, floa
 
 
 class HeldOut(Section):
-    """Measured values that the calibration was not fitted to, and how many lay in its intervals."""
+    """Measured values excluded from the calibration, and the number inside its intervals."""
 
     points: int = Field(ge=0)
     inside: int = Field(ge=0)
 
 
 class ModelCalibration(Section):
-    """A posterior: ``mean`` and ``covariance`` (n, n) of the coordinates of ``unknowns`` for an
-    actuator of which nothing was measured, and ``discrepancy``, the relative standard deviation
-    that the models miss, by group. ``pressing_spread`` is the standard deviation in mm of the
-    pocket loss from pressing to pressing, which the covariance contains. ``set_ups`` are the
-    probabilities of the set-ups that the source of a curve leaves open, by the curve's id.
+    """A posterior for an actuator without measurements.
 
-    ``film`` is the product of the evidence, ``evidence`` the sources that it was fitted to,
-    ``sizes`` those of its actuators by group of quantities; ``held_out`` says how many
-    left-out points lay in their intervals. ``sentences`` state what the evidence cannot
-    distinguish.
+    ``mean`` and ``covariance`` (n, n) are those of the coordinates of ``unknowns``; ``discrepancy``
+    is the relative standard deviation of the model error, by group. ``pressing_spread`` is the
+    standard deviation in mm of the pocket loss between pressings, which the covariance contains.
+    ``set_ups`` are the probabilities of the set-ups that the source of a curve leaves open, by the
+    curve's id.
+
+    ``film`` is the product of the evidence, ``evidence`` lists its sources, ``sizes`` those of its
+    actuators by group of quantities; ``held_out`` gives the number of left-out points in their
+    intervals. ``sentences`` state what the evidence cannot distinguish.
     """
 
     schema_name: Literal["sbafab/calibration@3"] = Field(alias="schema")
@@ -233,7 +234,7 @@ class ModelCalibration(Section):
     def _agrees_with_itself(self) -> Self:
         count = len(FIELDS)
         if list(self.unknowns) != FIELDS:
-            raise ValueError(f"has other unknowns than {listed(FIELDS)}, in this order")
+            raise ValueError(f"must have the unknowns {listed(FIELDS)}, in this order")
         if len(self.mean) != count:
             raise ValueError(f"has a mean of {len(self.mean)} numbers; it must be {count}")
         if {len(self.covariance), *map(len, self.covariance)} != {count}:
@@ -250,12 +251,12 @@ class ModelCalibration(Section):
                     f"{low:.3g} to {high:.3g}"
                 )
         if set(self.discrepancy) != set(GROUPS) or not set(self.sizes) <= set(GROUPS):
-            raise ValueError(f"must have a discrepancy, and may have sizes, of {listed(GROUPS)}")
+            raise ValueError(f"must have a discrepancy, and may have sizes, for {listed(GROUPS)}")
         return self
 
     @cached_property
     def values(self) -> dict[str, Any]:
-        """Median of each unknown, by field of ``Factors``."""
+        """The median of each unknown, by field of ``Factors``."""
         return {u.field: u.value(z) for u, z in zip(UNKNOWNS, self.mean, strict=True)}
 
     @cached_property
@@ -273,8 +274,8 @@ class ModelCalibration(Section):
         return unknown.value(self.mean[row] - half), unknown.value(self.mean[row] + half)
 
     def shifted(self) -> list[tuple[float, Factors]]:
-        """Return, for each design unknown, the move of its coordinate by about one standard
-        deviation, and the factors so moved.
+        """Return, for each design unknown, a change of its coordinate by about one standard
+        deviation, and the changed factors.
         """
         moved = []
         for row in range(DESIGN_UNKNOWNS):
@@ -301,9 +302,10 @@ class ModelCalibration(Section):
         return ModelCalibration.model_construct(**{**dict(self), **posterior})
 
     def for_films(self, products: Collection[str]) -> ModelCalibration:
-        """Return the calibration adapted to films that bond, by their products; if the evidence's
-        is not among them, the modulus ratio is 1, with the prior's uncertainty, and the share of
-        work lost is the prior's.
+        """Return the calibration adapted to films that bond, by product.
+
+        If the evidence's product is not among them, the modulus ratio is 1, with the prior's
+        uncertainty, and the share of work lost is the prior's.
         """
         if self.film in products:
             return self
@@ -319,21 +321,20 @@ class ModelCalibration(Section):
 
 @cache
 def deviations(share: float) -> float:
-    """Return the half width of the middle ``share`` of a normal distribution, in deviations."""
+    """The half width of the central ``share`` of a normal distribution, in standard deviations."""
     return NormalDist().inv_cdf((1 + share) / 2)
 
 
 def load_calibration(
     name: object, folder: Path | None = None, key: str = "models.calibration"
 ) -> ModelCalibration | None:
-    """Return the calibration of a name, or of a file in ``folder``; None for "none". ``key`` is
-    the key that gives the name.
+    """Return the calibration of a name, or of a file in ``folder``; None for "none".
 
-    Raises DesignError with one sentence for an unknown name or a faulty file.
+    ``key`` is the key with the name. Raises DesignError for an unknown name or an invalid file.
     """
     if not isinstance(name, str):
         raise DesignError(
-            f"{key} = {shown(name)} must be a text in quotes: a calibration's name or its file"
+            f"{key} = {shown(name)} must be a quoted text: the name or file of a calibration"
         )
     if name == NONE:
         return None
@@ -342,7 +343,7 @@ def load_calibration(
     path = (folder or Path()) / name
     if not is_file(path):
         raise DesignError(
-            f'{key} = {shown(name)} is neither "none", nor one that ships ({PAPER}), nor a file'
+            f'{key} = {shown(name)} is neither "none", nor a bundled one ({PAPER}), nor a file'
             + (" beside the design" if folder else "")
             + "; sbafab calibrate writes one"
         )
@@ -355,7 +356,7 @@ def _papers() -> ModelCalibration:
 
 
 def read_calibration(path: Path) -> ModelCalibration:
-    """Return the calibration of a file. Raises DesignError with one sentence for a fault in it."""
+    """The calibration in a file. Raises DesignError with one sentence if the file is invalid."""
     try:
         return checked(ModelCalibration, read_toml(path), {}, file="calibration")
     except DesignError as error:
@@ -377,7 +378,7 @@ GROUP_BY_UNIT = {"N": "force", "mJ": "work", "s": "time", "N/mm": "stiffness"}
 
 
 def discrepancy_group(figure: Figure) -> str | None:
-    """Return the group of a figure's discrepancy; None if no calibrated model gives it."""
+    """Return the group of a figure's discrepancy; None if no calibrated model predicts it."""
     if figure.model.id not in CALIBRATED_MODELS:
         return None
     named = {Quantity.FOLDED_HEIGHT: FLAT, Quantity.LOST_WORK: "loss", Quantity.BENT_FORCE: BENT}
@@ -385,9 +386,10 @@ def discrepancy_group(figure: Figure) -> str | None:
 
 
 class Reading(NamedTuple):
-    """A value that was measured on one actuator: the ``text`` in which it was given, the
-    ``measured`` value and its relative standard ``error``, and its ``figures`` at the median and at
-    each of the ``moved`` factors of an ``Uncertainty``.
+    """A value measured on one actuator.
+
+    ``text`` is the input, with the ``measured`` value, its relative standard ``error``, and the
+    ``figures`` predicted at the median and at each of the ``moved`` factors of an ``Uncertainty``.
     """
 
     text: str
@@ -477,8 +479,8 @@ class Uncertainty:
         return replace(self, calibration=posterior, measured=(change[count:], joint))
 
     def farther(self, group: str) -> float:
-        """Return the relative standard deviation assumed for a group of quantities, off what the
-        calibration's evidence has of it. Folded heights take no diameter.
+        """Return the relative standard deviation assumed for a group of quantities outside the
+        sizes of its evidence. Folded heights use no diameter.
         """
         known = self.calibration.sizes
         if self.laminate is None or self.form is None or not known:
@@ -531,12 +533,13 @@ class Uncertainty:
         term: str = "",
         may_be_negative: bool = False,
     ) -> tuple[float, Ends]:
-        """Return a value at the median, and the interval that holds what would be measured with a
-        probability of ``share``; ``value_at`` gives the value with other factors. ``term`` is the
-        field of an unknown that is one summand of the value, such as the delay of a time.
+        """Return a value at the median, and the interval that contains its measurement with a
+        probability of ``share``.
 
-        A clearance, which may be negative, is linear in the unknowns; so is a value that has almost
-        vanished with other factors, such as a force near the end of the stroke.
+        ``value_at`` gives the value with other factors. ``term`` is the field of an unknown that is
+        one summand of the value, such as the delay of a time. A clearance, which may be negative,
+        is linear in the unknowns, as is a value that nearly vanishes for other factors, such as a
+        force near the end of the stroke.
         """
         value, slopes, is_log = self.slopes(group, value_at, term, may_be_negative)
         low, high = self.interval(group, value, slopes, is_log, share)
@@ -553,8 +556,8 @@ class Uncertainty:
         term: str = "",
         may_be_negative: bool = False,
     ) -> tuple[float, list[float], bool]:
-        """Return a value at the median, its slopes by the coordinates of the unknowns, and True if
-        these are of its logarithm; arguments as of ``interval_of``.
+        """Return a value at the median, its slopes in the coordinates of the unknowns, and True if
+        these are slopes of its logarithm; arguments as for ``interval_of``.
         """
         factor = self.factor(group)
         value = factor * value_at(self.factors)
@@ -576,10 +579,10 @@ class Uncertainty:
         return value, slopes, is_log
 
     def built(self, readings: Sequence[Reading]) -> Uncertainty:
-        """Return what is known of an actuator on which ``readings`` were measured.
+        """Return the uncertainty for an actuator on which ``readings`` were measured.
 
-        Raises DesignError for a reading that no calibrated model gives, or that lies more than
-        CONTRADICTION standard deviations from what is predicted.
+        Raises DesignError for a reading that no calibrated model predicts, or that differs from the
+        prediction by more than CONTRADICTION standard deviations.
         """
         rows, missed, own = [], [], []
         for reading in readings:
@@ -587,8 +590,9 @@ class Uncertainty:
             values = [figure.value for figure in reading.figures]
             if group is None or not all(math.isfinite(each) and each > 0 for each in values):
                 raise DesignError(
-                    f"{reading.text}: no calibrated model gives the {reading.figures[0].name}; "
-                    "give a height, stroke, bend or force that it gives"
+                    f"{reading.text}: no calibrated model predicts the "
+                    f"{reading.figures[0].name}; give a height, stroke, bend or force that it "
+                    "predicts"
                 )
             by_factors = dict(zip((self.factors, *self.moved), values, strict=True))
             term = TERMS.get(reading.figures[0].quantity, "")
@@ -617,10 +621,10 @@ class Uncertainty:
                 )
                 raise DesignError(
                     f"{reading.text} lies {abs(away):.1f} standard deviations "
-                    f"{'above' if away > 0 else 'below'} the {reading.figures[0].value:.3g} "
-                    f"{reading.figures[0].unit} that is predicted, and speaks most against "
-                    f"{against}; check the reading, its unit and its pressure, and the design's "
-                    "film"
+                    f"{('above' if away > 0 else 'below')} the predicted "
+                    f"{reading.figures[0].value:.3g} {reading.figures[0].unit}, and contradicts "
+                    f"mostly {against}; check the reading, its unit and its pressure, and the "
+                    "design's film"
                 )
 
     def bounded(
@@ -629,9 +633,10 @@ class Uncertainty:
         moved: Iterable[Sequence[FigureItem]],
         share: float = SHARE,
     ) -> list[FigureItem]:
-        """Return the items with the intervals of figures that the calibration covers; ``moved`` are
-        the same figures at each of the ``moved`` factors. A figure that one of them lacks has no
-        interval.
+        """Return the items with the intervals of figures that the calibration covers.
+
+        ``moved`` are the same figures at each of the ``moved`` factors. A figure that one of them
+        lacks has no interval.
         """
         others = [
             {item.key: item.value for item in each if isinstance(item, Figure)} for each in moved
@@ -664,8 +669,8 @@ class Uncertainty:
         return replace(figure, value=value, interval=interval, flags=flags)
 
     def _of_unknown_flow(self, figure: Figure) -> Figure:
-        """Return the folded height of films that the calibration says nothing of: as bought at
-        most, and as far flown in the press as the prior allows, or as solid films are.
+        """Return the folded height of films that the calibration does not cover: from the height as
+        bought to the largest flow in the press that the prior allows, or as solid films.
         """
         if self.laminate is None:
             return figure
@@ -679,7 +684,7 @@ class Uncertainty:
 
 
 def calibration_of(design: Design, laminate: Laminate | None = None) -> ModelCalibration | None:
-    """Return the calibration of a design, adapted to the films of its laminate that bond. Raises
+    """Return the calibration of a design, adapted to the bonding films of its laminate. Raises
     DesignError if it is unknown.
     """
     calibration = load_calibration(design.models.calibration, design.folder)

@@ -1,6 +1,8 @@
-"""Closed forms, each as its source has it. Of pockets whose films keep their length: the paper's
-Eq. 4 as printed, its Eqs. 1 to 3 solved numerically (Sec. 3.1), a lens of two arcs for oblong
-pockets, its cylinder. Of actuators: constant curvature, folded lobes, tubes, the cantilever.
+"""Closed forms, each as in its source.
+
+For pockets with inextensible films: the paper's Eq. 4 as printed, its Eqs. 1 to 3 solved
+numerically (Sec. 3.1), and for oblong pockets a lens of two arcs and its cylinder. For actuators:
+constant curvature, folded lobes, tubes, the cantilever.
 
 Lengths mm, volumes ul, rates dv/dh in mm2.
 """
@@ -33,8 +35,8 @@ SHALLOW = 1e-3
 def within(values: ArrayLike, most: float, quantity: str, unit: str, model: str) -> Array:
     """Return the values as an array, if each lies from 0 to ``most``.
 
-    Raises DesignError with the first that does not and the range; its upper end is rounded down,
-    so that it is itself allowed.
+    Raises DesignError with the first value out of range and the range; its upper end is rounded
+    down, so that it is itself allowed.
     """
     checked = np.asarray(values, dtype=float)
     good = (checked >= 0) & (checked <= most * (1 + ROUNDING))
@@ -77,9 +79,9 @@ class ClosedForm:
     """The pockets of one chamber by a closed form: ``shape`` of one up to ``fullest``, and the
     ``sizes`` of all, bottom to top.
 
-    Pockets of unlike size (a tapered stack) are taken at equal height over size, so that one
-    formula holds for all: strokes add up with the size, volumes with its cube. Volumes are the mean
-    of the balloons. Methods raise DesignError out of range.
+    Pockets of different sizes (a tapered stack) are assumed to have equal height over size, so that
+    one formula applies to all: strokes add up with the size, volumes with its cube. Volumes are the
+    mean of the balloons. Methods raise DesignError out of range.
     """
 
     model: Model
@@ -103,31 +105,32 @@ class ClosedForm:
 
     @cached_property
     def largest_volume(self) -> float:
-        """The volume in ul a balloon of the fullest pockets."""
+        """The volume in ul per balloon of the fullest pockets."""
         return float(self.shape(np.asarray(self.fullest))[1]) * self._cube
 
     def stroke(self, volume: ArrayLike) -> Array:
-        """Return the stroke in mm at ul a balloon."""
+        """Return the stroke in mm at a volume in ul per balloon."""
         name = self.model.name
         volumes = within(volume, self.largest_volume, "volume", "ul a balloon", name) / self._cube
         at = inverse(lambda at: self.shape(at)[1], volumes, self.fullest)
         return np.asarray(self.shape(at)[0] * self._length)
 
     def volume(self, stroke: ArrayLike) -> Array:
-        """Return ul a balloon at a stroke in mm."""
+        """Return the volume in ul per balloon at a stroke in mm."""
         return np.asarray(self._shape_at(stroke)[1] * self._cube)
 
     def rate(self, stroke: ArrayLike) -> Array:
-        """Return dv/dh in mm2: the chamber's whole volume by its stroke."""
+        """Dv/dh in mm2: the derivative of the chamber's whole volume with respect to its stroke."""
         slope = self._shape_at(stroke)[2] * self._cube
         return np.asarray(slope * len(self.sizes) / self._length)
 
     def push(self, stroke: ArrayLike) -> Array:
-        """Return force over pressure in mm2 of the chamber blocked at a stroke, the same for every
-        balloon in it.
+        """Return force over pressure in mm2 of the chamber blocked at a stroke, equal for all its
+        balloons.
 
-        Of unlike ones at most the value of the smallest when flat; additional force from solid
-        films of shut balloons is not counted. They are then at unlike heights over size.
+        For different balloons it is at most the value of the smallest when flat; the additional
+        force of closed balloons' solid films is not counted. Height over size then differs between
+        them.
         """
         if len(set(self.sizes)) == 1:
             return self.rate(stroke)
@@ -135,7 +138,7 @@ class ClosedForm:
 
     @cached_property
     def _in_series(self) -> tuple[Array, Array]:
-        """Strokes, and force over pressure there, of unlike balloons that carry the same force."""
+        """Strokes, and force over pressure there, of different balloons under the same force."""
         at = np.linspace(0.0, float(self.shape(np.asarray(self.fullest))[0]), SAMPLES)
         rates = self.shape(inverse(lambda each: self.shape(each)[0], at, self.fullest))[2]
         # A formula may rise again past the full state; a balloon does not.
@@ -157,9 +160,9 @@ def eq_4(*radii: float) -> ClosedForm:
     """Return Eq. 4 as printed, of round pockets: v = pi (32 h^5 - 24 h^3 l^2 + 18 h l^4) /
     (27 l^2).
 
-    It begins 4/3 as steep as the Eqs. 1 to 3 that it is derived from (docs/prediction.md). It rises
-    for every h, but means something only up to the height at which one half by those holds most:
-    1.328 mm and 13.30 ul at l = 2.5.
+    Its initial slope is 4/3 that of Eqs. 1 to 3, from which it is derived (docs/prediction.md). It
+    rises for every h, but is meaningful only up to the height at which one half has the largest
+    volume by those equations: 1.328 mm and 13.30 ul at l = 2.5.
     """
 
     def shape(h: Array) -> tuple[Array, Array, Array]:
@@ -186,7 +189,7 @@ def _eq_4_trust(radius: float) -> str:
 
 @cache
 def eqs_1_to_3(*radii: float) -> ClosedForm:
-    """Return two halves by Eqs. 1 to 3, of round pockets: 16.947 ul at most at l = 2.5, each half
+    """Return two halves by Eqs. 1 to 3, of round pockets: at most 16.947 ul at l = 2.5, with halves
     1.33 mm high.
 
     The meridian of a half is the parabola y = h - a x^2 down to y = 0 at x = rho; its arc keeps the
@@ -197,7 +200,7 @@ def eqs_1_to_3(*radii: float) -> ClosedForm:
         rho = 2 l / (s + q)       h = k rho / 2
         v = pi rho^2 h / 2        dv/dh = pi rho^2 (2 q - s) / 2 q
 
-    A half holds most where s = 2 q.
+    A half has its largest volume at s = 2 q.
     """
 
     def shape(k: Array) -> tuple[Array, Array, Array]:
@@ -226,10 +229,11 @@ def lens(width: float, run: float, balloons: int = 1) -> ClosedForm:
     """Return the lens of oblong pockets: slots ``width`` wide, with a straight ``run`` and half
     discs at their ends.
 
-    Two films of equal half angle b: each arc is R = width / 2b in radius and keeps its length. The
-    straight run is then a prism of that lens, and the ends together one body of revolution with the
-    same meridian: two spherical caps. At b = pi/2 the run is a cylinder (``cylinder_height``); with
-    its ends a balloon holds most a little earlier, and no air drives it farther.
+    Two films of equal half angle b: each arc has the radius R = width / 2b and keeps its length.
+    The straight run is then a prism of that lens, and the ends together form one body of revolution
+    with the same meridian: two spherical caps. At b = pi/2 the run is a cylinder
+    (``cylinder_height``); with its ends a balloon reaches its largest volume slightly earlier, and
+    cannot be inflated farther.
     """
 
     def shape(b: Array) -> tuple[Array, Array, Array]:
@@ -255,20 +259,20 @@ def lens(width: float, run: float, balloons: int = 1) -> ClosedForm:
 
 
 def cylinder_height(width: float) -> float:
-    """Return the height in mm of a slot whose films became a full cylinder, its ends not holding it
-    back: what the paper's "about 28" answers to (Sec. 2.1).
+    """Return the height in mm of a slot whose films form a full cylinder, unrestrained by its ends:
+    the paper's "about 28" (Sec. 2.1).
     """
     return 2 * width / math.pi
 
 
 def scaled_stroke(radii: Sequence[float]) -> float:
-    """Return the paper's stroke in mm in proportion to radii: 17.5 for 15 of 2.5 (Sec. 4.6)."""
+    """Return the paper's stroke in mm, scaled with the radii: 17.5 for 15 of 2.5 (Sec. 4.6)."""
     return FULL_SHARE * sum(radii)
 
 
 class Bend(NamedTuple):
-    """Angle of the top (radians), direction in which it leans (radians from x), length of the axis
-    (mm), tip (..., 3) in mm, from the middle of the base.
+    """Angle of the top (radians), bending direction (radians from x), length of the axis (mm), and
+    tip (..., 3) in mm, from the middle of the base.
     """
 
     angle: Array
@@ -282,7 +286,7 @@ def bend(lengths: ArrayLike, axes: ArrayLike) -> Bend:
 
     Constant curvature: a plane through the chambers' ends, fitted if there are more than three,
     gives the length on the axis and the gradient across it; the axis is then an arc. Valid to about
-    half a turn: past pi the tip would come down through the base.
+    half a turn: past pi the tip would pass through the base.
     """
     places = np.asarray(axes, dtype=float)
     to_plane = np.linalg.pinv(np.column_stack([np.ones(len(places)), places]))
@@ -305,7 +309,7 @@ LOBES = 3
 
 
 def folded_diameter(width: float, thickness: float) -> float:
-    """Return the circle (mm) round three lobes folded into a triangle, their outer corners on it.
+    """Return the circle (mm) around three lobes folded into a triangle, their outer corners on it.
 
     Each lobe is a bar ``width`` long and ``thickness`` deep, a chord of the circle; their inner
     faces are the triangle's sides.
@@ -320,8 +324,8 @@ def folded_diameter(width: float, thickness: float) -> float:
 def largest_tube(width: float, strip: float = 0.0) -> float:
     """Return the outer diameter (mm) of the tube that fills a flat channel ``width`` mm wide.
 
-    The tube and a PTFE strip ``strip`` mm thick along one side of it have half their perimeter
-    equal to the channel's width.
+    Half the perimeter around the tube and a PTFE strip ``strip`` mm thick along one side equals the
+    channel's width.
     """
     return 2 * width / math.pi - strip
 

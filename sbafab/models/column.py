@@ -1,8 +1,8 @@
 """Plates joined by balloons in equilibrium at given pressures, many states at once; one pose is a
 batch of one.
 
-Without a load levels of equal balloons are equal, and solved once. An outer plate is stiffened
-gradually: a stiff one would be met by one point of the top after the other.
+Without a load, levels of equal balloons are equal and solved once. An outer plate is stiffened
+gradually: a stiff one would meet one point of the top after another.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ NOT_FOUND = (
 
 @dataclass(frozen=True)
 class Plate:
-    """An outer plate that the tip may push on: through ``point`` (mm), ``normal`` pointing away.
+    """An outer plate that the tip may push on: through ``point`` (mm), with an outward ``normal``.
 
     ``Plate.at(height)`` lies level. With ``sticks`` friction holds the middle of the tip on the
     line through the point along the normal, also above or below the plate; without, it slides along
@@ -67,11 +67,11 @@ class Plate:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """A stack in equilibrium at ``pressures`` (kPa, one a chamber).
+    """A stack in equilibrium at ``pressures`` (kPa, one per chamber).
 
     ``pitch`` is the height of a flat level in mm, ``freedoms`` (levels, 3) are rise in mm and tilt
-    in rad of each level; ``gaps`` (levels, chambers) by how many mm each balloon has risen at its
-    own centre; ``volumes`` ul a chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
+    in rad of each level; ``gaps`` (levels, chambers) is the rise in mm of each balloon at its
+    centre; ``volumes`` in ul per chamber; ``force`` N on the outer plate; ``energy`` uJ stored in
     the films. A pose that is not ``stable`` is an unstable equilibrium, such as a straight column
     that would buckle.
     """
@@ -91,29 +91,29 @@ class Pose:
 
     @property
     def frames(self) -> tuple[Array, Array]:
-        """Origins (n, 3) in mm and axes (n, 3, 3) of the plates, the base first; the columns of
+        """The origins (n, 3) in mm and axes (n, 3, 3) of the plates, the base first; the columns of
         ``axes[i]`` are the x, y and z of plate i.
         """
         return self._chain.places, self._chain.axes
 
     @property
     def tip(self) -> Array:
-        """Middle of the top plate (3,) in mm."""
+        """The middle of the top plate (3,) in mm."""
         return self._chain.tip
 
     @property
     def height(self) -> float:
-        """Height of the middle of the top plate above the base, mm."""
+        """The height of the middle of the top plate above the base, mm."""
         return float(self.tip[2])
 
     @property
     def bend(self) -> float:
-        """Degrees from base to top; along the stack, so that it may be more than half a turn."""
+        """Degrees from base to top, summed along the stack, so it may exceed half a turn."""
         return math.degrees(math.hypot(*self.freedoms[:, 1:].sum(0)))
 
     @property
     def direction(self) -> float:
-        """Degrees round the base, from x, towards which it bends; 0 where it stands straight."""
+        """The bending direction in degrees around the base from x; 0 for a straight stack."""
         x, y = self.freedoms[:, 1:].sum(0)
         return math.degrees(math.atan2(-x, y)) if math.hypot(x, y) > 1e-9 else 0.0
 
@@ -123,7 +123,7 @@ class BatchPoses:
     """N poses of a ``column`` under a ``load`` at ``pressures`` (N, chambers) in kPa.
 
     ``freedoms`` (N, levels, 3) are rise in mm and tilt in rad of each level; ``pushes`` (N,) mN on
-    an outer plate; which are stable and which have been found (N,).
+    an outer plate; with masks (N,) of stable states and of those found.
     """
 
     column: Column
@@ -160,7 +160,7 @@ class BatchPoses:
 
     @cached_property
     def _stored(self) -> tuple[Array, Array]:
-        """Volumes (N, chambers) in ul, and energies of the films (N,) in uJ."""
+        """The volumes (N, chambers) in ul, and energies of the films (N,) in uJ."""
         column, is_alike = self.column, self.load is None
         if not len(self):
             return np.zeros(self.pressures.shape), np.zeros(0)
@@ -175,22 +175,22 @@ class BatchPoses:
 
     @property
     def volumes(self) -> Array:
-        """Volumes of the chambers in ul: (N, chambers)."""
+        """The volumes of the chambers in ul: (N, chambers)."""
         return self._stored[0]
 
     @property
     def energies(self) -> Array:
-        """Energies stored in the films in uJ: (N,)."""
+        """The energies stored in the films in uJ: (N,)."""
         return self._stored[1]
 
     @cached_property
     def tips(self) -> Array:
-        """Middles of the top plates in mm: (N, 3)."""
+        """The middles of the top plates in mm: (N, 3)."""
         return plate_chain(self.freedoms, self.column.pitch).tip
 
     @property
     def heights(self) -> Array:
-        """Heights of the middles of the top plates above the base in mm: (N,)."""
+        """The heights of the middles of the top plates above the base in mm: (N,)."""
         return np.asarray(self.tips[:, 2])
 
     @property
@@ -200,18 +200,18 @@ class BatchPoses:
 
     @property
     def forces(self) -> Array:
-        """N on an outer plate: (N,)."""
+        """The forces in N on an outer plate: (N,)."""
         return self.pushes / 1000
 
     @cached_property
     def excess(self) -> Array:
-        """By how many mm a balloon rises above its map: (N,)."""
+        """The height in mm of a balloon above its map: (N,)."""
         above = self.freedoms @ self.column.centres - self.column.tops[self.column.levels]
         return np.asarray(above.max((1, 2), initial=-math.inf))
 
     @property
     def is_met(self) -> NDArray[np.bool_]:
-        """Which have been found, with all balloons on their maps: (N,)."""
+        """True for states that were found with all balloons on their maps: (N,)."""
         return np.asarray(self.is_found & (self.excess <= 0))
 
     def pose(self, number: int = 0) -> Pose:
@@ -230,21 +230,21 @@ class BatchPoses:
         )
 
     def met(self) -> BatchPoses:
-        """Return the states. Raises DesignError for the first that has no pose."""
+        """Return the states. Raises DesignError for the first without a pose."""
         for number in np.flatnonzero(~self.is_met)[:1]:
             if not self.is_found[number]:
                 raise DesignError(NOT_FOUND)
             raise DesignError(
-                "a balloon would rise higher than its films can be stretched "
-                f"({self.excess[number]:.2g} mm above {self.column.tops.min():.3g} mm); give less "
-                "pressure or load"
+                "a balloon would rise beyond the stretch limit of its films "
+                f"({self.excess[number]:.2g} mm above {self.column.tops.min():.3g} mm); reduce "
+                "the pressure or load"
             )
         return self
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """Plates joined by balloons, in equilibrium at given pressures. Fields as of ``Stack``."""
+    """Plates joined by balloons, in equilibrium at given pressures. Fields as in ``Stack``."""
 
     maps: tuple[BalloonMap, ...]
     levels: NDArray[np.int_]
@@ -266,25 +266,25 @@ class Column:
 
     @cached_property
     def most_pressure(self) -> float:
-        """Highest pressure of all maps in kPa, without the noise of scaling by the modulus."""
+        """The highest pressure of all maps in kPa, without rounding errors from scaling."""
         return round(min(kind.most_pressure for kind in self.maps), 9)
 
     @cached_property
     def tops(self) -> Array:
-        """Largest height in mm of the map of each kind: (kinds, 1)."""
+        """The largest height in mm of the map of each kind: (kinds, 1)."""
         return np.array([[kind.most_height] for kind in self.maps])
 
     @cached_property
     def centres(self) -> Array:
-        """Gap at each chamber's middle, by rise and tilt: (3, chambers)."""
+        """The gap at each chamber's middle, as a function of rise and tilt: (3, chambers)."""
         return _gaps(self.axes).T
 
     @cached_property
     def rims(self) -> Array:
-        """Gap at points round each kind's outline, by rise and tilt: (kinds, points, 3).
+        """The gap at points around each kind's outline, by rise and tilt: (kinds, points, 3).
 
-        The outline is the convex hull of the films' rims: whatever way plates lean, what meets
-        first lies on it.
+        The outline is the convex hull of the films' rims: whichever way plates lean, the first
+        contact lies on it.
         """
         # An even number a chamber, from the first one's axis on, and half a step off it: no way
         # points between two chambers, where one would stand for both.
@@ -311,13 +311,13 @@ class Column:
         return np.array([int(np.argmax(self.levels == kind)) for kind in range(len(self.maps))])
 
     def rows_of(self, freedoms: Array, load: Load | None) -> Array:
-        """Return the freedoms (n, rows, 3) of levels' (n, levels, 3): a row per kind of balloon
-        without a load, per level under one.
+        """Return the freedoms (n, rows, 3) of levels' (n, levels, 3): one row per kind of balloon
+        without a load, per level with one.
         """
         return freedoms[:, self._first_levels] if load is None else freedoms
 
     def counts(self, load: Load | None) -> Array:
-        """Return how many levels each row stands for."""
+        """Return the number of levels that each row represents."""
         if load is not None:
             return np.ones(len(self.levels))
         return np.bincount(self.levels, minlength=len(self.maps)).astype(float)
@@ -328,8 +328,8 @@ class Column:
         """Return the springs of each kind of balloon, or of each level, at pressures (n, chambers)
         in kPa. Raises DesignError for those outside the maps.
 
-        With ``sucked`` a chamber that is shut may stand below 0 kPa; rates of volumes by pressure
-        need three ``orders``.
+        With ``sucked`` a closed chamber may be below 0 kPa; derivatives of volumes with respect to
+        pressure need three ``orders``.
         """
         tables = [kind.splines(pressures, orders, sucked)[:, :, None] for kind in self.maps]
         table = tables[0] if len(tables) == 1 else np.concatenate(tables, axis=2)
@@ -340,15 +340,15 @@ class Column:
         return Springs(table.reshape(DEGREE + 1, -1), begins, stride, size, places)
 
     def start_freedoms(self, pressures: Array) -> Array:
-        """Return rise and tilt to start from at pressures (n, chambers), one row per kind of
-        balloon (n, kinds, 3): the plane nearest to the free heights of the balloons.
+        """Return initial rise and tilt at pressures (n, chambers), one row per kind of balloon (n,
+        kinds, 3): the plane nearest to the free heights of the balloons.
         """
         rises = [kind.rises(pressures)[..., None, :] for kind in self.maps]
         return np.concatenate(rises, axis=-2) @ np.linalg.pinv(self.centres)
 
     def states(self, load: Load | None, pressures: Array, freedoms: Array | None) -> BatchPoses:
-        """Return states at pressures (n, chambers) and freedoms (n, levels, 3) that are not known
-        to be in equilibrium.
+        """Return states at pressures (n, chambers) and freedoms (n, levels, 3), not necessarily in
+        equilibrium.
         """
         count = len(pressures)
         if freedoms is None:
@@ -435,7 +435,7 @@ class Column:
 
     @property
     def level_weight(self) -> float:
-        """Weight of a level in mN. Raises DesignError if it is not known."""
+        """The weight of a level in mN. Raises DesignError if it is unknown."""
         if self.weight is None:
             raise DesignError(
                 "gravity needs the density of every film; add films.<name>.density, in kg/m3"
@@ -449,13 +449,13 @@ class Column:
         return numbers_of(pressures, (rows, self.chambers), sentence)
 
     def acting(self, arguments: dict[str, Any]) -> Load | None:
-        """Return the load that arguments of ``pose`` beside pressures are, None without any. Raises
-        DesignError.
+        """Return the load from the arguments of ``pose`` other than pressures; None if there are
+        none. Raises DesignError.
         """
         unknown = sorted(set(arguments) - {*LOADS, "sucked"})
         if unknown:
             raise DesignError(
-                f"a load has no {unknown[0]}; give tip_load, gravity or plate, as of Stack.pose"
+                f"a load has no {unknown[0]}; use tip_load, gravity or plate, as in Stack.pose"
             )
         tip_load, gravity, plate = ({**LOADS, **arguments}[name] for name in LOADS)
         force, weight, wall = 1000 * vector_of(tip_load, "tip_load in N"), None, None
@@ -479,8 +479,8 @@ class Column:
         return OuterPlate.of(point, normal, plate.sticks, self.outline)
 
     def within(self, pose: Pose) -> bool:
-        """Return True if the maps hold for all balloons of a pose: within 3 % of balloons between
-        plates that are computed there. False where one lies outside, or cannot be computed.
+        """Return True if the maps are valid for all balloons of a pose: within 3 % of balloons
+        between plates computed there. False if one lies outside, or cannot be computed.
         """
         (holds,) = self.hold([pose])
         return holds
@@ -504,14 +504,14 @@ class Column:
 
 
 def _gaps(points: Array) -> Array:
-    """Return the gaps at points (n, 2) of a level's plane by its rise and tilt: (n, 3)."""
+    """The gaps at points (n, 2) of a level's plane as functions of its rise and tilt: (n, 3)."""
     x, y = points.T
     return np.stack([np.ones_like(x), y, -x], -1)
 
 
 def numbers_of(values: ArrayLike, shape: tuple[int | None, ...], sentence: str) -> Array:
     """Return finite numbers of a shape, in which None is any length. Raises DesignError with a
-    sentence if they are not.
+    sentence for others.
     """
     try:
         array = np.asarray(values, dtype=float)
@@ -525,13 +525,13 @@ def numbers_of(values: ArrayLike, shape: tuple[int | None, ...], sentence: str) 
 
 
 def vector_of(values: Sequence[float], quantity: str) -> Array:
-    """Return three numbers (3,). Raises DesignError if they are not three, or not finite."""
+    """Return three numbers (3,). Raises DesignError unless there are three finite numbers."""
     sentence = f"{quantity} must be three finite numbers, such as (0, 0, -0.1)"
     return numbers_of(values, (3,), sentence)
 
 
 def direction_of(values: Sequence[float], quantity: str) -> Array:
-    """Return the direction (3,) of three numbers. Raises DesignError if they have none."""
+    """Return the direction (3,) of three numbers. Raises DesignError if all are 0."""
     vector = vector_of(values, quantity)
     length = float(np.linalg.norm(vector))
     if not length:

@@ -1,10 +1,10 @@
-"""Stacks linearised: derivatives of poses by pressures, forces and moments on the tip, and an outer
-plate; and Newton's method for freedoms and pressures together.
+"""Linearised stacks: derivatives of poses with respect to pressures, forces and moments on the tip,
+and an outer plate; and Newton's method for freedoms and pressures together.
 
 In equilibrium the gradient g(q, x) of the energy is 0, so the freedoms q follow a change of x by
-dq/dx = -H^-1 dg/dx, with H the second derivatives of the energy with the closed contacts (implicit
-function theorem). If a contact is just closing or opening, derivatives apply to the pose's side.
-The first axis of arrays is that of states.
+dq/dx = -H^-1 dg/dx, with the second derivatives H of the energy at fixed contacts (implicit
+function theorem). If a contact is just closing or opening, the derivatives are one-sided. The first
+axis of arrays is that of states.
 """
 
 from __future__ import annotations
@@ -50,9 +50,9 @@ CONTACT_ROUNDS = 8
 class Linearised(NamedTuple):
     """n states linearised at freedoms ``at`` (n, rows, 3): their ``springs`` and ``energy``.
 
-    ``counts`` (freedoms,) are how many levels each freedom stands for. ``volumes`` (n, chambers) in
-    ul, with their rates ``filling`` (n, freedoms, chambers) by a level's freedoms and ``swelling``
-    (n, chambers) by pressures with all plates held.
+    ``counts`` (freedoms,) is the number of levels that each freedom represents. ``volumes`` (n,
+    chambers) in ul have the derivatives ``filling`` (n, freedoms, chambers) with respect to a
+    level's freedoms and ``swelling`` (n, chambers) with respect to pressures with all plates held.
     """
 
     column: Column
@@ -65,8 +65,8 @@ class Linearised(NamedTuple):
     swelling: Array
 
     def top(self) -> tuple[Array, Array]:
-        """Return tips (n, 3) in mm, and the turn and move of the top by the freedoms (n, freedoms,
-        6), as of ``Chain.motions``.
+        """Return tips (n, 3) in mm, and the rotation and translation of the top per unit of the
+        freedoms (n, freedoms, 6), as in ``Chain.motions``.
         """
         if self.energy.plates is not None and self.energy.motions is not None:
             return self.energy.plates.tip, self.energy.motions
@@ -79,8 +79,8 @@ class Linearised(NamedTuple):
         return plates.tip, motions.reshape(count, -1, 6)
 
     def tip_motion(self) -> tuple[Array, Array]:
-        """Return tips (n, 3) in mm, and the motion of the tip, then the turn of the top, by
-        freedoms: (n, 6, freedoms).
+        """Return tips (n, 3) in mm, and the motion of the tip, then the rotation of the top, per
+        unit of the freedoms: (n, 6, freedoms).
         """
         tip, motions = self.top()
         turns = motions[..., :3]
@@ -88,12 +88,12 @@ class Linearised(NamedTuple):
         return tip, motion.swapaxes(1, 2)
 
     def filled(self, moves: Array) -> Array:
-        """Return the volumes' changes (n, chambers, k) by moves (n, freedoms, k)."""
+        """Return the changes of volumes (n, chambers, k) due to moves (n, freedoms, k)."""
         return np.asarray((self.filling * self.counts[:, None]).swapaxes(1, 2) @ moves)
 
     def pushed(self) -> tuple[Array, Array]:
-        """Return the force in mN on an outer plate by the freedoms (n, freedoms), and by a shift of
-        the plate (n).
+        """Return the derivatives of the force in mN on an outer plate with respect to the freedoms
+        (n, freedoms) and to a shift of the plate (n).
         """
         touch = self.energy.touch
         if touch is None:
@@ -103,8 +103,8 @@ class Linearised(NamedTuple):
         return pushes, stiff.sum(1)
 
     def moves(self, pulls: Array) -> Array:
-        """Return the moves of the freedoms (n, freedoms, k) by pulls on them (n, freedoms, k) in mN
-        or mN mm. Raises DesignError for a pose that is about to buckle.
+        """Return the moves of the freedoms (n, freedoms, k) under generalised forces (n, freedoms,
+        k) in mN or mN mm. Raises DesignError for a pose that is about to buckle.
         """
         try:
             return self.energy.solved(pulls)
@@ -122,7 +122,7 @@ def linearised(
     forces: Array | None = None,
 ) -> Linearised:
     """Return n states linearised at pressures (n, chambers) in kPa and freedoms (n, rows, 3) of
-    levels, or of kinds of balloons without a load; ``forces`` of an outer plate as of ``energy``.
+    levels, or of kinds of balloons without a load; ``forces`` of an outer plate as in ``energy``.
     """
     by_level = at.shape[1] == len(column.levels)
     springs = column.springs(pressures, sucked=True, by_level=by_level, orders=3)
@@ -137,8 +137,8 @@ def linearised(
 
 
 def linearised_poses(poses: BatchPoses) -> Linearised:
-    """Return poses linearised by level, in equilibrium to rounding. Raises DesignError for a pose
-    that is about to buckle.
+    """Return poses linearised by level, in equilibrium to rounding accuracy. Raises DesignError for
+    a pose that is about to buckle.
     """
     at = poses.freedoms
     for _ in range(CORRECTIONS):
@@ -151,9 +151,9 @@ def linearised_poses(poses: BatchPoses) -> Linearised:
 
 
 class Rates(NamedTuple):
-    """Rates of a pose by n quantities: of the middle of the ``tip`` (3, n) in mm, the ``turn`` of
-    the top (3, n) in rad about x, y and z, ``volumes`` (chambers, n) in ul, and the ``force`` (n)
-    in N on an outer plate.
+    """Derivatives of a pose with respect to n quantities: of the middle of the ``tip`` (3, n) in
+    mm, the rotation ``turn`` of the top (3, n) in rad about x, y and z, ``volumes`` (chambers, n)
+    in ul, and the ``force`` (n) in N on an outer plate.
     """
 
     tip: Array
@@ -162,15 +162,15 @@ class Rates(NamedTuple):
     force: Array
 
     def by(self, quantities: slice) -> Rates:
-        """Return those by some of the quantities."""
+        """Return those for some of the quantities."""
         return Rates(*(part[..., quantities] for part in self))
 
 
 @dataclass(frozen=True, eq=False)
 class Derivatives:
-    """A ``pose`` with its rates ``by_pressure`` (each chamber's, a kPa), ``by_wrench`` (forces on
-    the middle of the top along x, y and z, a N, then moments, a N mm), and ``by_plate`` (an outer
-    plate, a mm along its normal), None without.
+    """A ``pose`` with its derivatives ``by_pressure`` (per kPa in each chamber), ``by_wrench`` (per
+    N along x, y and z on the middle of the top, then per N mm), and ``by_plate`` (per mm of an
+    outer plate along its normal; None without one).
     """
 
     pose: Pose
@@ -180,12 +180,12 @@ class Derivatives:
 
     @property
     def compliance(self) -> Array:
-        """Motion of the tip by forces and moments on it: (6, 6), mm and rad by N and N mm."""
+        """The motion of the tip per force and moment on it: (6, 6), mm and rad per N and N mm."""
         return np.concatenate([self.by_wrench.tip, self.by_wrench.turn])
 
     @property
     def stiffness(self) -> Array:
-        """Forces and moments on the tip by its motion: (6, 6), N and N mm by mm and rad.
+        """The forces and moments on the tip per motion: (6, 6), N and N mm per mm and rad.
 
         Inverse of the compliance over the motions that the levels allow, 0 along others, such as
         the twist of a straight stack: balloons carry no shear.
@@ -202,8 +202,8 @@ class Derivatives:
 
 
 def derivatives(poses: BatchPoses) -> Derivatives:
-    """Return the derivatives of the first of poses under its load. Raises DesignError for a pose
-    that is about to buckle.
+    """Return the derivatives of the first of the poses under its load. Raises DesignError for a
+    pose that is about to buckle.
     """
     now, chambers = linearised_poses(poses.part(slice(1))), poses.column.chambers
     pushed, hardness = now.pushed()
@@ -233,13 +233,13 @@ def pressure_at(places: ArrayLike) -> Array:
 
 
 def pressure_rate(places: Array) -> Array:
-    """Return the rates of pressures in kPa by their coordinates."""
+    """Return the derivatives of pressures in kPa with respect to their coordinates."""
     return np.asarray(P0 * np.cosh(places))
 
 
 class Unknowns(NamedTuple):
     """Coordinates of pressures (n, chambers), freedoms (n, rows, 3) and contact forces (n, points)
-    in mN, NaN where a plate's stiffness makes them.
+    in mN, NaN if they follow from a plate's stiffness.
     """
 
     x: Array
@@ -262,10 +262,11 @@ def together(
     enough: float = LAST_ERROR,
     forces: Array | None = None,
 ) -> tuple[Array, BatchPoses]:
-    """Return the states after Newton's method for freedoms and pressures together: an outer plate's
-    contact forces (n, points) in mN, and as found those whose steps became smaller than ``enough``.
+    """Return the states after Newton's method for freedoms and pressures together, with an outer
+    plate's contact forces (n, points) in mN.
 
-    Coordinates of pressures stay within ``ends``. Contact ``forces`` are additional unknowns.
+    States count as found if their steps become smaller than ``enough``. Coordinates of pressures
+    stay within ``ends``. Contact ``forces`` are additional unknowns.
     """
     column, load = begin.column, begin.load
     if forces is None:
@@ -313,11 +314,11 @@ def _step(
     run: Unknowns, now: Linearised, ahead: Callable[[Linearised, Array, Array], Array]
 ) -> tuple[Array, Array, Array]:
     """Return the steps of freedoms (n, rows, 3) and of the pressures' coordinates (n, chambers) to
-    the linearised equilibria, and by how many mm a plate's points are then deeper (n, points).
+    the linearised equilibria, and the increase in mm of the depth of a plate's points (n, points).
 
-    A plate's contacts are those at the step's end. They act on the freedoms through the six turns
-    and moves of the top alone, so that other contacts than the first need no further solution of
-    all levels (Woodbury).
+    A plate's contacts are those at the step's end. They act on the freedoms only through the six
+    rotations and translations of the top, so that changed contacts need no further solution of all
+    levels (Woodbury).
     """
     filling = now.filling * pressure_rate(run.x)[:, None]
     pulls, touch = [-now.energy.gradient[..., None], filling], now.energy.touch
@@ -358,8 +359,8 @@ def _sum(moves: Array, dx: Array) -> Array:
 
 
 def _contact_top(touch: PlateContact, is_in: Any) -> tuple[Array, Array]:
-    """Return the stiffness (n, 6, 6) and the pull (n, 6) of points in contact (n, points) on the
-    turns and moves of the top.
+    """Return the stiffness (n, 6, 6) and the force (n, 6) of points in contact (n, points) on the
+    rotations and translations of the top.
     """
     stiff = touch.stiff * is_in
     lines = touch.lines.swapaxes(1, 2)

@@ -108,9 +108,11 @@ FreeShapes = Mapping[float, Shapes | DesignError]
 
 @dataclass(frozen=True)
 class Inflated:
-    """An actuator with its stack, or why it has none (None: not computed); the ``rises`` of a free
-    chamber by pressure in kPa; and the poses ``bent`` by some chambers, each with the clearance
-    between chambers in mm. Errors stand for what has no equilibrium.
+    """An actuator with its stack, or the reason why it has none (None: not computed).
+
+    ``rises`` are those of a free chamber by pressure in kPa; ``bent`` are the poses bent by some
+    chambers, each with the clearance between chambers in mm. Errors replace values without an
+    equilibrium.
     """
 
     actuator: Actuator
@@ -152,7 +154,7 @@ def inflated(
 
 
 def _attempt(value: Callable[..., Value], *at: Any) -> Value | DesignError:
-    """Return a value, or why there is none."""
+    """Return a value, or the reason why there is none."""
     try:
         return value(*at)
     except DesignError as error:
@@ -212,13 +214,13 @@ def _rise(
 
 
 def tip_force(factors: Factors) -> tuple[float, float, float]:
-    """Return the force in N of what stands on the tip, for a base that lies level."""
+    """Return the weight in N on the tip, for a level base."""
     return (0.0, 0.0, -1e-3 * GRAVITY * factors.tip_load)
 
 
 def _loaded_rise(of: Actuator, whole: Stack | LeftOut | None, pressure: float) -> Rise:
     if not isinstance(whole, Stack):
-        raise DesignError("with a weight on the tip it is that of the elastic stack")
+        raise DesignError("with a weight on the tip, only the elastic stack gives it")
     pose = whole.pose((pressure,) * whole.chambers, tip_force(of.factors))
     rise = pose.height - whole.flat_height
     return Rise(rise, float(pose.volumes[0]), pose.energy / whole.chambers)
@@ -253,12 +255,12 @@ def _bent_poses(
 
 
 def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
-    """Return the smallest clearance in mm between the films of balloons side by side in each pose
-    of a stack.
+    """Return the smallest clearance in mm between the films of adjacent balloons in each pose of a
+    stack.
 
-    Below 0 they would pass through each other. Both are in the frame of their level, and balloons
-    of other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError
-    for a balloon without an equilibrium.
+    It is negative if they would intersect. Both are in the frame of their level, and balloons of
+    other levels lie beyond a plate, so that axes and largest radii suffice. Raises DesignError for
+    a balloon without an equilibrium.
     """
     firsts: dict[Balloon, BalloonMap] = {}
     places: list[tuple[Balloon, float, float]] = []
@@ -291,7 +293,7 @@ def chamber_clearances(posed: Sequence[tuple[Stack, Pose]]) -> list[float]:
 def rim_gap(stack: Stack, pose: Pose) -> float:
     """Return the smallest gap in mm between rims of neighbouring levels.
 
-    0 for flat levels, and if levels lean so far that their rims touch.
+    0 for flat levels, and if levels tilt so far that their rims touch.
     """
     gaps = stack.rims[stack.levels] @ pose.freedoms[..., None]
     return max(float(gaps.min()), 0.0)
@@ -299,7 +301,7 @@ def rim_gap(stack: Stack, pose: Pose) -> float:
 
 def held_stretch(kinds: Sequence[Balloon], pressures: ArrayLike, strokes: ArrayLike) -> Array:
     """Return the largest strain of the films of a chamber's balloons at pressures (n,) in kPa and
-    strokes of all (n,) in mm, each balloon at the same height over radius.
+    strokes of all (n,) in mm, with an equal ratio of height to radius for all balloons.
     """
     high = np.asarray(strokes, dtype=float) / sum(balloon.pocket for balloon in kinds)
     each = [
@@ -313,8 +315,8 @@ def refuse_stretched(longer: float) -> None:
     """Raise BeyondError for a film that is stretched too far."""
     if longer > MOST_STRETCH:
         raise BeyondError(
-            f"the film would be {100 * longer:.0f} % longer, and one modulus is unlikely to hold "
-            f"beyond {100 * MOST_STRETCH:g} %; ask for less pressure",
+            f"the film would stretch by {100 * longer:.0f} %, and a constant modulus is unlikely "
+            f"to be valid beyond {100 * MOST_STRETCH:g} %; lower the pressure",
             longer / MOST_STRETCH - 1,
         )
 
@@ -344,7 +346,7 @@ def free_strokes(state: Inflated) -> Iterator[FigureItem]:
 
 
 def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | LeftOut | None:
-    """Return the stack of an actuator with round pockets, or why not; None for others."""
+    """The stack of an actuator with round pockets, or why there is none; None for other forms."""
     if not actuator.radii:
         return None
     most = max(MOST_PRESSURE, *request.pressures_kpa, 0.0)
@@ -355,9 +357,7 @@ def elastic_stack(actuator: Actuator, request: PredictionRequest) -> Stack | Lef
 
 
 def moved_stack(together: Stack, actuator: Actuator, moved: Factors) -> Stack | None:
-    """Return an actuator's stack at ``moved`` factors without new maps; None if it needs new
-    ones.
-    """
+    """Return an actuator's stack at ``moved`` factors without new maps; None if it needs any."""
     factors = actuator.factors
     if moved.pocket_loss != factors.pocket_loss:
         return None
@@ -382,9 +382,11 @@ def stack_figures(
     checks_films: bool = True,
     checks_maps: bool = False,
 ) -> Iterator[FigureItem]:
-    """Yield forces, bending, times and stiffness of the stack. With ``checks_films`` figures with
-    films stretched too far are left out; with ``checks_maps`` figures are flagged if their balloons
-    are outside the valid range of a map. Poses that ``guides`` lack are added.
+    """Yield forces, bending, times and stiffness of the stack.
+
+    With ``checks_films`` figures with overstretched films are omitted; with ``checks_maps`` figures
+    are flagged if their balloons are outside the valid range of a map. Poses that ``guides`` lack
+    are added.
     """
     assert isinstance(state.stack, Stack)
     stack, factors = state.stack, state.actuator.factors
@@ -432,8 +434,8 @@ def _forces(
 
 
 def _level_pose(stack: Stack, pressure: float, stroke: float) -> Pose | None:
-    """Return the straight pose below a level plate that holds a stack at a stroke in mm; None
-    without one. A column that would buckle there is not stable.
+    """Return the straight pose below a level plate that holds a stack at a stroke in mm; None if
+    there is none. A column that would buckle there is not stable.
     """
     pressures, plate = (pressure,) * stack.chambers, stack.flat_height + stroke
     pose = _attempt(partial(stack.pose, plate=plate), pressures)
@@ -473,12 +475,12 @@ def poses_bent_by(
     bends: Sequence[tuple[int, float]],
     ranges: Mapping[int, tuple[float, float]] | None = None,
 ) -> list[Pose | None]:
-    """Return the pose of each bend: some chambers pressurised, the others empty, bent by an angle
-    in degrees; None if no pressure gives it, or none in the range in kPa that ``ranges`` give by
-    the bend's number.
+    """Return the pose of each bend: some chambers pressurised and the others empty, bent by an
+    angle in degrees; None if no pressure gives it, or none in the range in kPa that ``ranges``
+    holds for the bend's number.
 
-    Bisection until both ends have poses, then false position by the pressure's logarithm, with the
-    end that stays halved (Illinois); all bends in step.
+    Bisection until both ends have poses, then false position in the logarithm of the pressure,
+    halving the end that is retained (Illinois); all bends in step.
     """
     poses: list[Pose | None] = [None] * len(bends)
     given = {} if ranges is None else ranges
@@ -513,7 +515,7 @@ def poses_bent_by(
 def _bent_forces(
     request: PredictionRequest, stack: Stack, guides: Guides, factors: Factors
 ) -> Iterator[PosedItem]:
-    """Yield forces on a plate square to the bent tip, its chambers pressurised further."""
+    """Yield forces on a plate perpendicular to the bent tip, at higher chamber pressures."""
     if not request.pressures_kpa or request.wanted is not None:
         return
     quantity, model = Quantity.BENT_FORCE, calibrated(FORCE, factors)
@@ -543,8 +545,10 @@ def _bent_forces(
 def pressed_further(
     stack: Stack, chambers: int, pressure: float, bent: Pose, near: Pose | None = None
 ) -> Pose:
-    """Return the pose with some chambers at a pressure in kPa below a plate square to the tip of a
-    bent pose; ``near`` is a pose to start from. Raises DesignError without one.
+    """Return the pose with some chambers at a pressure in kPa below a plate perpendicular to the
+    tip of a bent pose.
+
+    ``near`` is an initial pose. Raises DesignError if there is no such pose.
     """
     (x, y, z), (across, aside, along) = bent.tip.tolist(), bent.frames[1][-1][:, 2].tolist()
     plate = Plate((x, y, z), (across, aside, along))
@@ -554,8 +558,8 @@ def pressed_further(
 def time_to_fill(
     stack: Stack, flow_ml_min: float, until: float, length: float = TUBE_LENGTH
 ) -> tuple[float, Pose]:
-    """Return the seconds of water at a flow, shared by all chambers through tubes of a ``length``
-    in mm, until the pump shows a pressure in kPa; and the pose by then.
+    """Return the seconds until the pump shows a pressure in kPa, for a flow of water shared by all
+    chambers through tubes of a ``length`` in mm; and the pose at that time.
 
     Raises DesignError if the pressure drop of the tubes alone is as large.
     """
@@ -569,8 +573,8 @@ def time_to_fill(
 
 
 def air_time(whole: Stack, flow_ml_min: float, until: float, line: Line) -> float:
-    """Return the seconds of air at a steady flow of the pump, shared by all chambers, until they
-    have a pressure in kPa: the air that they and their lines take in, over the flow.
+    """Return the seconds of a steady air flow of the pump, shared by all chambers, until they reach
+    a pressure in kPa: the air that they and their lines take in, divided by the flow.
     """
     held = line.dead_volume + line.tube_volume
     empty, full = (
@@ -612,8 +616,8 @@ def _stiffness(request: PredictionRequest, stack: Stack, factors: Factors) -> It
 
 
 def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
-    """Return the lateral stiffness of the tip in N/mm with the chambers shut at a pressure in kPa,
-    and the height in mm.
+    """Return the lateral stiffness of the tip in N/mm with the chambers closed at a pressure in
+    kPa, and the height in mm.
     """
     aside = (PROBE_FORCE, 0.0, 0.0)
     start = stack.pose((pressure,) * stack.chambers)
@@ -623,7 +627,7 @@ def shut_stiffness(stack: Stack, pressure: float) -> tuple[float, float]:
 
 
 def force_traces(actuator: Actuator, request: PredictionRequest, stack: Stack) -> list[Trace]:
-    """Return curves of force against stroke, one a pressure."""
+    """Return curves of force against stroke, one per pressure."""
     most = actuator.reference_height - actuator.thickness
     if not actuator.has_reference:
         most = min(each.largest_stroke for each in actuator.pockets)
@@ -653,7 +657,7 @@ def bend_relation(factors: Factors, stack: Stack) -> Relation:
 
 
 def workspace_traces(factors: Factors, stack: Stack) -> list[Trace]:
-    """Return paths of the tip with 1, 2 ... chambers up to 10 kPa, the others empty or full."""
+    """Tip paths with 1, 2 ... chambers inflated up to 10 kPa and the others empty or full."""
     model = calibrated(BEND, factors)
     pressures = np.linspace(0.1, paper.FULL_KPA**0.5, SAMPLES) ** 2
     lines = []
@@ -667,7 +671,7 @@ def workspace_traces(factors: Factors, stack: Stack) -> list[Trace]:
 
 
 def _poses(stack: Stack, chambers: int, pressures: Array, rest: float = 0.0) -> BatchPoses:
-    """Return the poses at rising pressures in some chambers, up to the first that has none."""
+    """Return the poses at rising pressures in some chambers, up to the first without one."""
     rows = np.full((len(pressures), stack.chambers), rest)
     rows[:, :chambers] = pressures[:, None]
     states = stack.equilibria(rows[rows.max(1) <= stack.most_pressure], None)
@@ -682,8 +686,8 @@ def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
     """Return the force in N of one straight chamber blocked at strokes in mm; 0 beyond its free
     stroke.
 
-    At most the force of its weakest balloon when flat. Below the stroke at which this balloon
-    shuts, its solid films may carry more; that is not counted.
+    It is at most the force of its weakest balloon when flat. Below the stroke at which this balloon
+    closes, its solid films may carry more, which is not counted.
     """
     curves = [_curve(balloon, pressure) for balloon in stack.maps]
     counts = np.bincount(stack.levels, minlength=len(stack.maps))
@@ -697,6 +701,6 @@ def blocked_force(stack: Stack, pressure: float, stroke: ArrayLike) -> Array:
 
 
 def _curve(balloon: BalloonMap, pressure: float) -> tuple[Array, Array]:
-    """Return heights in mm and the force in mN there, made monotonic."""
+    """Return heights in mm and the force in mN at each, made monotonic."""
     heights = np.linspace(0.0, balloon.most_height, SERIES_SAMPLES)
     return heights, np.minimum.accumulate(balloon.force(pressure, heights))

@@ -1,5 +1,5 @@
-"""Gymnasium environments of a stack, one and many at once: actions set the valves, the tip is to
-reach a target.
+"""Gymnasium environments of a stack, single and vectorised: actions set the valves, and the tip
+must reach a target.
 """
 
 from __future__ import annotations
@@ -23,14 +23,13 @@ Stepped = tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, An
 
 
 class ReachEnvironment(gymnasium.Env[Any, Any]):
-    """Task of moving the tip of a stack to a point that it can reach.
+    """Task of moving the tip of a stack to a reachable point.
 
     An action has one number per chamber, from -1 (vented) to 1 (``most_pressure`` kPa at its
-    valve).
-    Observations: positions of tip and target and the vector between them in mm, pressures in the
-    chambers in kPa. The reward is the negative distance in mm. An episode ends within ``near`` mm,
-    and is cut off after ``steps`` of ``dt`` s. ``load`` are keyword arguments of ``Stack.pose``
-    beside pressures.
+    valve). Observations: positions of tip and target and the vector between them in mm, pressures
+    in the chambers in kPa. The reward is the negative distance in mm. An episode terminates within
+    ``near`` mm, and is truncated after ``steps`` of ``dt`` s. ``load`` holds keyword arguments of
+    ``Stack.pose`` other than pressures.
     """
 
     metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 (as in Gymnasium)
@@ -51,7 +50,7 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
         return observation, {}
 
     def step(self, action: Any) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Return the observation ``dt`` s later, the reward, if it arrived, and if time is over."""
+        """The observation ``dt`` s later, the reward, and the terminated and truncated flags."""
         observations, rewards, is_there, is_late, info = self._one.moved(np.asarray(action)[None])
         is_over = bool(is_there[0]), bool(is_late[0])
         return observations[0], float(rewards[0]), *is_over, {"time": float(info["time"][0])}
@@ -60,8 +59,8 @@ class ReachEnvironment(gymnasium.Env[Any, Any]):
 class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
     """``num_envs`` tasks of ``ReachEnvironment`` in one: its arguments, observations and rewards.
 
-    Seeds and restarts as of ``gymnasium.vector.SyncVectorEnv``: the step after an episode's end
-    starts the next one. Slow against an outer plate.
+    Seeds and restarts as in ``gymnasium.vector.SyncVectorEnv``: the step after an episode's end
+    starts the next one. Slow with an outer plate.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 (as in Gymnasium)
@@ -85,7 +84,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         if not 0 < most_pressure <= stack.most_pressure:
             raise DesignError(
                 f"most_pressure = {most_pressure:g} kPa must be above 0 and at most "
-                f"{stack.most_pressure:g} kPa, to which the stack was made"
+                f"{stack.most_pressure:g} kPa, the range of the stack"
             )
         # Films may stretch: no tip is farther than this.
         far = 2 * sum(stack.maps[kind].most_height + stack.pitch for kind in stack.levels)
@@ -109,13 +108,13 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Array, dict[str, Any]]:
-        """Vent all chambers. Targets are ``options["target"]`` in mm, (3,) or (num_envs, 3), or
-        random poses' tips; with one ``seed`` each environment has the next one.
+        """Vent all chambers. Targets are ``options["target"]`` in mm, (3,) or (num_envs, 3), or the
+        tips of random poses; one ``seed`` is incremented for each environment.
         """
         if seed is not None:
             seeds = range(seed, seed + self.num_envs) if isinstance(seed, int) else seed
             if len(seeds) != self.num_envs:
-                raise DesignError(f"give a seed, or {self.num_envs} of them")
+                raise DesignError(f"give one seed, or {self.num_envs} seeds")
             for number, one in enumerate(seeds):
                 if one is not None:
                     self.random[number] = np_random(one)[0]
@@ -124,7 +123,8 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return self._observations(), {}
 
     def step(self, actions: Any) -> Stepped:
-        """Return observations ``dt`` s later, rewards, which arrived, and which have no time left.
+        """Return observations ``dt`` s later, rewards, and which tasks terminated or were
+        truncated.
 
         Environments whose episode was over start the next one instead, with the reward 0.
         """
@@ -142,9 +142,9 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return seen, rewards, is_there, is_late, info
 
     def moved(self, actions: Any) -> Stepped:
-        """Return what ``step`` does, without restarts."""
+        """Return the result of ``step``, without restarts."""
         if not self._has_begun:
-            raise DesignError("the environment is at no place yet; call reset first")
+            raise DesignError("the environment has no state yet; call reset first")
         shares = (np.clip(np.asarray(actions, dtype=float), -1.0, 1.0) + 1) / 2
         self._motion.step(self.dt, shares * self.most_pressure)
         self._left -= 1
@@ -155,7 +155,7 @@ class ReachVectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, Any]):
         return observations, -away, is_there, is_late, {"time": self._motion.times.copy()}
 
     def _begin(self, which: NDArray[np.bool_], target: Any = None) -> None:
-        """Begin an episode of some of the environments."""
+        """Begin an episode in some of the environments."""
         if target is None:
             size = (self.batch.stack.chambers,)
             numbers = [self.random[number] for number in np.flatnonzero(which)]

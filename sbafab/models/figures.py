@@ -1,5 +1,5 @@
 """Records of a prediction: figures and curves with their models, its verdict, and the choice of the
-model to design with.
+design model.
 """
 
 from __future__ import annotations
@@ -77,11 +77,11 @@ class Model:
 
     @property
     def title(self) -> str:
-        """Name and source in one."""
+        """The name and source as one text."""
         return f"{self.name} ({self.source})" if self.source else self.name
 
     def filled(self, **facts: object) -> Model:
-        """Return the model with facts in the places of its source and validity."""
+        """Return the model with facts inserted in its source and validity."""
         source, trust = self.source.format(**facts), self.trust.format(**facts)
         return replace(self, source=source, trust=trust)
 
@@ -102,10 +102,10 @@ class Figure:
     """One predicted number: the ``value`` of a ``quantity``, in its unit, ``at`` its conditions.
 
     ``other``: shown for comparison; design with the other model's figure of the same quantity.
-    ``measured``: the paper's measurement, if the model is off by more than a quarter of it.
-    The value lies ``between`` two of the same unit, if a drawn pocket is replaced by a disc.
-    A measurement would lie in the ``interval``, in the same unit, with a probability of 90 %, if
-    the calibration gives one. ``flags`` are warnings about its validity.
+    ``measured``: the paper's measurement, if the model deviates from it by more than a quarter. The
+    value lies ``between`` two of the same unit, if a drawn pocket is replaced by a disc. The
+    ``interval``, in the same unit, contains a measurement with a probability of 90 %, if the
+    calibration gives one. ``flags`` are warnings about its validity.
     """
 
     quantity: Quantity
@@ -120,7 +120,7 @@ class Figure:
 
     @property
     def name(self) -> str:
-        """Display name: quantity and conditions."""
+        """The display name: quantity and conditions."""
         return self.quantity.named(self.at)
 
     @property
@@ -139,7 +139,7 @@ class Figure:
         return self.quantity.unit
 
     def is_of(self, quantity: Quantity, at: Conditions | None = None) -> bool:
-        """Return True for a figure of a quantity, at conditions that meet ``at``."""
+        """Return True for a figure of a quantity, at conditions that match ``at``."""
         return self.quantity is quantity and (at is None or self.at.meet(at))
 
     @property
@@ -169,7 +169,7 @@ class Figure:
 
     @property
     def design_with(self) -> bool:
-        """False where another model gives the same quantity, and that one is to design with."""
+        """False if another model of the same quantity should be used for design."""
         return not self.other
 
     def as_dict(self) -> dict[str, Any]:
@@ -179,9 +179,10 @@ class Figure:
 
 @dataclass(frozen=True)
 class Trace:
-    """A predicted curve; without a model measured by the paper, and of points each +- its ``error``
-    (0 where it gives none). The labels of the relation contain the unit of ``x``, and the unit of
-    ``y`` and its ``error``.
+    """A predicted curve or, without a model, one measured by the paper.
+
+    Its points have an ``error`` +- (0 if not given). The labels of the relation contain the unit of
+    ``x``, and the unit of ``y`` and its ``error``.
     """
 
     label: str
@@ -197,13 +198,13 @@ class Trace:
 
     @property
     def trust(self) -> str:
-        """The model's validity; empty of what is measured."""
+        """The model's validity; empty for measurements."""
         return self.model.trust if self.model else ""
 
 
 @dataclass(frozen=True)
 class Relation:
-    """One quantity against another: ``name`` is a file's stem, labels carry their units."""
+    """One quantity against another: ``name`` is a file's stem; labels include their units."""
 
     name: str
     title: str
@@ -238,8 +239,9 @@ QuantityEntry = Annotated[Quantity, PlainSerializer(attrgetter("key"), return_ty
 
 @dataclass(frozen=True)
 class LeftOut:
-    """What is not given, and why; with the ``quantities`` if they are specific ones, and the
-    ``error`` if one was raised.
+    """An omitted figure and the reason.
+
+    ``quantities`` are the affected ones, if specific; ``error`` is the one that was raised, if any.
     """
 
     name: str
@@ -250,7 +252,7 @@ class LeftOut:
 
     @classmethod
     def of(cls, name: str, error: DesignError, *quantities: Quantity) -> LeftOut:
-        """Return what an error leaves out."""
+        """Return the omission caused by an error."""
         return cls(name, str(error), quantities, error)
 
 
@@ -294,9 +296,7 @@ USUAL_PRESSURES = (10.0, 100.0)
 
 
 class MeasuredValue(NamedTuple):
-    """A value that was measured on one actuator, in the unit of its quantity, and the ``text`` in
-    which it was given.
-    """
+    """A value measured on one actuator, in the unit of its quantity, and its input ``text``."""
 
     text: str
     quantity: Quantity
@@ -307,7 +307,7 @@ class MeasuredValue(NamedTuple):
 @dataclass(frozen=True)
 class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
-    volumes in ul a balloon, and factors.
+    volumes in ul per balloon, and factors.
 
     Without ``calibration`` the factors come from the design's calibration, with ``tip_load`` g on
     the free tip. Intervals hold a measurement with this ``probability`` (a share). If one figure is
@@ -330,7 +330,7 @@ class PredictionRequest:
 
     def places(self, usual: Iterable[Conditions], *of: Quantity) -> list[Conditions]:
         """Return the conditions at which any ``of`` these quantities is wanted: the ``usual`` ones,
-        or that of the one figure.
+        or those of the one figure.
         """
         if self.wanted is None:
             return list(usual)
@@ -343,7 +343,7 @@ class PredictionRequest:
 
     @property
     def measured_texts(self) -> list[str]:
-        """The measured values as they were given."""
+        """The measured values as entered."""
         return [one.text for one in self.measured]
 
 
@@ -369,8 +369,8 @@ class Prediction:
         return {**self.__dict__, "relations": self.relations, "curves": tuple}
 
     def figure(self, quantity: Quantity | str, model: str = "", **at: Any) -> Figure:
-        """Return the figure of a quantity at conditions (fields of ``Conditions``, those that tell
-        figures apart), by a model (its id), or by the one to design with.
+        """Return the figure of a quantity at conditions (distinguishing fields of ``Conditions``),
+        by a model (its id) or by the design model.
 
         Raises DesignError if no figure or several match.
         """
@@ -398,17 +398,17 @@ class Prediction:
         return self.figure(quantity, model, **at).value
 
     def relation(self, name: str) -> Relation:
-        """Return the curves of this name, such as "force". Raises DesignError without any."""
+        """Return the curves of this name, such as "force". Raises DesignError if there are none."""
         for relation in self.relations:
             if relation.name == name:
                 return relation
         names = [relation.name for relation in self.relations]
         near = difflib.get_close_matches(name, names, 3) or names
-        raise DesignError(f"no relation is named {name!r}; did you mean {' or '.join(near)}?")
+        raise DesignError(f"there is no relation {name!r}; did you mean {' or '.join(near)}?")
 
     @property
     def verdict(self) -> tuple[VerdictLine, ...]:
-        """Lines with the main figures, their validity, and the omitted figures with reasons."""
+        """The lines with the main figures, their validity, and the omitted figures with reasons."""
         before = {figure.key: figure for figure in self.before}
         lines = [
             VerdictLine(quantity, _shown(figure), _note(figure, before.get(figure.key)))
@@ -443,12 +443,12 @@ class Prediction:
         return table_html(("", "", "unit", "model", "validity"), rows)
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the content of ``predict.json``, its schema apart."""
+        """Return the content of ``predict.json``, except its schema."""
         return PredictionDocument.of(self)
 
 
 def _rounded(value: float) -> float:
-    """Return a value to seven digits, without the noise of arithmetic."""
+    """Return a value rounded to seven digits, without floating-point noise."""
     if value == 0 or not math.isfinite(value):
         return 0.0
     digits = 6 - math.floor(math.log10(abs(value)))
@@ -499,9 +499,7 @@ class VerdictLine:
 
 
 def _main_figures(figures: Sequence[Figure]) -> Iterator[tuple[str, Figure]]:
-    """Yield strokes, a bend, forces and burst with their quantities, each by the model to design
-    with.
-    """
+    """Yield strokes, a bend, forces and burst with their quantities, each by the design model."""
     of: dict[Quantity, list[Figure]] = {}
     for figure in figures:
         is_flat = figure.quantity is not Quantity.BLOCKED_FORCE or not figure.at.share
@@ -518,7 +516,7 @@ def _main_figures(figures: Sequence[Figure]) -> Iterator[tuple[str, Figure]]:
 
 
 def _shown(figure: Figure) -> str:
-    """Return value, 90 % interval, name and model of a figure in one line."""
+    """Return value, 90 % interval, name and model of a figure as one line."""
     value = f"{figure.value:.4g} {figure.unit}"
     if figure.interval is not None:
         value = f"{figure.value:.3g} {figure.unit} ({figure.range})"
@@ -526,8 +524,8 @@ def _shown(figure: Figure) -> str:
 
 
 def _note(figure: Figure, before: Figure | None = None) -> str:
-    """Return what it was without the measured values, else flags and counterpart, else the interval
-    of measurements, else the validity.
+    """Return the figure's value without measured values, else flags and counterpart, else the
+    interval of measurements, else the validity.
     """
     if before is not None and figure.interval != before.interval:
         return (
@@ -566,7 +564,7 @@ SUPERSEDED: tuple[tuple[str, tuple[ModelId, ...], tuple[ModelId, ...]], ...] = (
 def chosen(
     figures: Iterable[Figure], to_come: tuple[ModelId, ...] = (), is_calibrated: bool = False
 ) -> tuple[Figure, ...]:
-    """Return the figures with those marked as ``other`` that are not to be designed with.
+    """Return the figures with those not for design marked as ``other``.
 
     ``to_come`` are models whose figures are omitted for now; if calibrated ones, all blocked forces
     are marked. Among figures of one name the first with an interval is chosen, which comes from a
@@ -630,7 +628,7 @@ class AskedEntry(Document):
 
 
 class PredictedFigure(Document):
-    """A figure, at the conditions that it depends on."""
+    """A figure, at the conditions on which it depends."""
 
     quantity: QuantityEntry
     at: ConditionsEntry
@@ -664,7 +662,7 @@ class TraceEntry(Document):
 
 
 class PointsEntry(Document):
-    """Measured points, each +- its error (0 where the paper gives none)."""
+    """Measured points, each +- its error (0 if the paper gives none)."""
 
     label: str
     x: list[Rounded]
@@ -673,7 +671,7 @@ class PointsEntry(Document):
 
 
 class RelationEntry(Document):
-    """Curves and points; ``x`` and ``y`` are labels of the axes, with their units."""
+    """Curves and points; ``x`` and ``y`` are axis labels with units."""
 
     name: str
     title: str
@@ -686,7 +684,7 @@ class RelationEntry(Document):
 
 
 class PredictionDocument(Document):
-    """All that is predicted of one design."""
+    """All predictions for one design."""
 
     asked: AskedEntry
     verdict: list[VerdictLine]

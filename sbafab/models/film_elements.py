@@ -1,10 +1,10 @@
-"""Energy of a film of revolution by element: membrane stretch, wrinkling, bending, and its air.
+"""Energy of an axisymmetric film by element: membrane stretch, wrinkling, bending, and its air.
 
 A film is a chain of nodes r, z (mm). Many films are computed at once: arrays have a column for
 each. Functions return an energy (uJ: kPa mm3) for each film with its first and second derivatives
-by the coordinates of an element: the differences of its two nodes in r and z, and their mean
-radius. Kinks couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` turn these into
-derivatives by the coordinates of nodes.
+with respect to the coordinates of an element: the differences of its two nodes in r and z, and
+their mean radius. Kinks couple neighbours. ``assembled_gradient`` and ``assembled_tangent`` convert
+these into derivatives with respect to the coordinates of nodes.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ class Elements(NamedTuple):
 
 
 class EnergyTerm(NamedTuple):
-    """An energy, (films,), with its derivatives by dr, dz and the middle radius, each (elements,
-    films), and second ones: dr dr, dr dz, dz dz, and if it depends on the radius dr middle,
-    dz middle, middle middle.
+    """An energy, (films,), with its derivatives with respect to dr, dz and the middle radius, each
+    (elements, films), and second ones: dr dr, dr dz, dz dz, and, if it depends on the radius, dr
+    middle, dz middle, middle middle.
     """
 
     energy: Array
@@ -162,8 +162,8 @@ def bending(flat: Balloon, at: Elements) -> tuple[EnergyTerm, list[Array]]:
 def air_volume(flat: Balloon, at: Elements) -> EnergyTerm:
     """Return the air (ul) between the inner face of a film and the plane of its edge.
 
-    The film's middle starts half a thickness above that plane, and its inner face is smaller, by
-    Steiner's formula for the volume of a thick film.
+    The film's mid-surface starts half a thickness above that plane, and its inner face is smaller,
+    by Steiner's formula for the volume of a thick film.
     """
     dr, dz, middle = at.dr, at.dz, at.middle
     half = np.where(np.arange(len(dr)) < flat.edge, math.pi * flat.thickness, 0.0)[:, None]
@@ -197,7 +197,7 @@ def air_volume(flat: Balloon, at: Elements) -> EnergyTerm:
 
 
 def assembled_gradient(slopes: list[Array]) -> Array:
-    """Return the derivatives by the coordinates r, z of each node in turn: (coordinates, films)."""
+    """The derivatives for the coordinates r, z of each node in turn: (coordinates, films)."""
     by_dr, by_dz, by_middle = slopes
     count, films = by_dr.shape
     by_node = np.zeros((2 * count + 2, films))
@@ -210,8 +210,8 @@ def assembled_gradient(slopes: list[Array]) -> Array:
 
 
 def assembled_tangent(curves: list[Array], joined: list[Array]) -> Array:
-    """Return the second derivatives by coordinates, as a band: (coordinates, 6, films), in which
-    ``[i, k]`` is the derivative by coordinates i and i + k.
+    """Return the second derivatives with respect to coordinates, as a band: (coordinates, 6,
+    films), in which ``[i, k]`` is the derivative with respect to coordinates i and i + k.
     """
     rr, rz, zz, rm, zm, mm = curves
     count, films = rr.shape

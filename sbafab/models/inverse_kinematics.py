@@ -1,13 +1,13 @@
 """Inverse kinematics of stacks: the pressures that bring the middle of the top to a place, for many
 places at once, under a load and in contact.
 
-First freedoms and pressures are found together by Newton's method: each step solves the linearised
-equilibrium, and the pressures' change is the least, within their limits, that brings the linearised
-tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Outer plates are stiffened
-gradually: on soft ones the top's load shifts from point to point as it rolls, so rates hardly jump.
-Where these steps do not converge, Levenberg and Marquardt's method goes from equilibrium to
-equilibrium by the tip's derivatives. Pressures are counted in coordinates in which heights are
-nearly linear (``place_of``). Arrays have one row per place.
+First freedoms and pressures are solved together by Newton's method: each step solves the linearised
+equilibrium, and the pressures' change is the smallest, within their limits, that brings the
+linearised tip to the place (Nocedal and Wright, Numerical Optimization, Sec. 18.1). Outer plates
+are stiffened gradually: on compliant ones the top's load shifts from point to point as it rolls, so
+derivatives hardly jump. If these steps do not converge, the Levenberg-Marquardt method goes from
+equilibrium to equilibrium with the tip's derivatives. Pressures are expressed in coordinates in
+which heights are nearly linear (``place_of``). Arrays have one row per place.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ TOGETHER = 128
 def reached(
     column: Column, load: Load | None, places: Array, most_pressure: float, near: Pose | None
 ) -> BatchPoses:
-    """Return the poses whose tips stand at places (n, 3) in mm, with 0 to ``most_pressure`` in kPa;
-    ``near`` is a pose to start from. Raises UnreachableError with the nearest tip found.
+    """Return the poses with tips at places (n, 3) in mm, at 0 to ``most_pressure`` in kPa; ``near``
+    is an initial pose. Raises UnreachableError with the nearest tip found.
     """
     states = []
     for begin in range(0, max(len(places), 1), TOGETHER):
@@ -86,11 +86,11 @@ class Search:
 
     @property
     def rest(self) -> NDArray[np.int_]:
-        """Numbers of the places that are searched."""
+        """The numbers of the places still searched."""
         return np.flatnonzero(~self.is_over)
 
     def run(self, near: Pose | None) -> None:
-        """Search from a pose, or from all over the range. Raises UnreachableError."""
+        """Search from a pose, or from starts over the whole range. Raises UnreachableError."""
         if near is not None:
             x = place_of(np.tile(near.pressures, (len(self.places), 1)))
             at = near.freedoms[None].repeat(len(x), 0)
@@ -107,7 +107,7 @@ class Search:
         self._refuse_missed()
 
     def _newton_from(self, x: Array) -> None:
-        """Search by Newton's method from pressures' coordinates (n, chambers)."""
+        """Search by Newton's method from pressure coordinates (n, chambers)."""
         at = self.column.start_freedoms(pressure_at(x))[:, self.column.levels]
         if self.wall is not None:
             self._newton(self.rest, x, at, SOFT)
@@ -119,8 +119,8 @@ class Search:
     def _newton(
         self, rest: NDArray[np.int_], x: Array, at: Array, soft: tuple[float, ...] = ()
     ) -> None:
-        """Search from pressures' coordinates (n, chambers) and freedoms (n, levels, 3), first
-        against ``soft`` plates.
+        """Search from pressure coordinates (n, chambers) and freedoms (n, levels, 3), first against
+        ``soft`` plates.
         """
         if not rest.size:
             return
@@ -145,7 +145,7 @@ class Search:
         self._take(rest, states)
 
     def _ahead(self, places: Array, now: Linearised, x: Array, moves: Array) -> Array:
-        """Return the steps of coordinates (n, chambers), as of ``together``."""
+        """Return the steps of coordinates (n, chambers), as for ``together``."""
         (tip, motion), wall = now.tip_motion(), self.wall
         moved = motion[:, :3] @ moves
         rates, away = moved[..., 1:], places - tip
@@ -161,8 +161,8 @@ class Search:
         return self._bounded(rates, missing, damping, x)
 
     def _bounded(self, rates: Array, missing: Array, damping: Array, x: Array) -> Array:
-        """Return the steps (n, chambers) with least |rates @ step - missing|^2 + damping |step|^2,
-        of rates (n, 3, chambers), that stay within the range.
+        """Return the steps (n, chambers) that stay within the range and minimise |rates @ step -
+        missing|^2 + damping |step|^2, for rates (n, 3, chambers).
         """
         turned = rates.swapaxes(1, 2)
         matrix = turned @ rates + damping[:, None, None] * np.eye(rates.shape[-1])
@@ -172,8 +172,8 @@ class Search:
     # From equilibrium to equilibrium.
 
     def _descend(self, x: Array, near: Array | None) -> None:
-        """Descend by Levenberg and Marquardt's method from the equilibria at coordinates (n,
-        chambers), found from freedoms (n, levels, 3) if given.
+        """Descend by the Levenberg-Marquardt method from the equilibria at coordinates (n,
+        chambers), solved from freedoms (n, levels, 3) if given.
         """
         rest = self.rest
         x = x[rest]
@@ -211,7 +211,7 @@ class Search:
     # The nearest states.
 
     def _take(self, which: NDArray[np.int_], states: BatchPoses) -> None:
-        """Keep states for some of the places if they are nearer."""
+        """Keep states for some of the places if their tips are nearer."""
         missing = self.places[which] - states.tips
         away = np.where(states.is_met, np.linalg.norm(missing, axis=-1), math.inf)
         away += np.where(states.is_stable, 0.0, UNSTABLE)
@@ -224,7 +224,7 @@ class Search:
         self.away[which[good]], self.is_over[which[good]] = away[good], is_end[good]
 
     def _settle_for_met(self) -> None:
-        """End the search for places that tips have reached, if only just."""
+        """End the search for places that tips have reached, even if only just."""
         self.is_over |= self.away < MET
 
     def _refuse_missed(self) -> None:
@@ -248,8 +248,8 @@ class Search:
     # Starts.
 
     def _guess(self) -> Array:
-        """Return coordinates (n, chambers) of chambers as long as on arcs from the base to the
-        places: constant curvature (Webster and Jones 2010), square to the base.
+        """Return coordinates (n, chambers) of chambers with the lengths of arcs from the base to
+        the places: constant curvature (Webster and Jones 2010), perpendicular to the base.
         """
         column, grid = self.column, np.linspace(0.0, self.most, 33)
         aside, up = np.hypot(*self.places[:, :2].T), self.places[:, 2]
@@ -272,8 +272,8 @@ def further_starts(guess: Array, most: float) -> list[Array]:
 def movable(wall: OuterPlate, missing: Array) -> Array:
     """Return the part of distances (n, 3) in mm that pressures can remove.
 
-    A plate that the tip sticks to yields across its line by less than ``MET``: pressures would
-    stray if they tried to move the tip that way.
+    A plate to which the tip sticks yields across its line by less than ``MET``: pressures would
+    diverge if they tried to move the tip that way.
     """
     if not wall.sticks:
         return missing

@@ -86,7 +86,7 @@ def equilibrium(
 
 
 def _where(good: NDArray[np.bool_], new: Array, old: Array) -> Array:
-    """Return the columns of ``new`` where good, else of ``old``."""
+    """Return the columns of ``new`` if good, else of ``old``."""
     return new if good.all() else np.where(good, new, old)
 
 
@@ -137,7 +137,7 @@ def solve(band: Array, right_side: Array) -> Array:
 
 
 def solve_whole(band: Array, right_side: Array) -> Array | None:
-    """Return the solution of A x = ``right_side`` as ``solve`` does; None unless all A are positive
+    """Return the solution of A x = ``right_side`` like ``solve``; None unless all A are positive
     definite. Faster for few rows.
     """
     whole = dense(band)
@@ -158,8 +158,8 @@ def dense(band: Array) -> Array:
 
 
 class Packing(NamedTuple):
-    """Index map to a band (size, width) of unknowns: the sums from ``starts`` of the ``source``
-    entries times their ``weight`` go ``into`` its elements.
+    """An index map to a band (size, width) of unknowns: the sums from ``starts`` of the ``source``
+    entries times their ``weight`` are stored ``into`` its elements.
     """
 
     source: NDArray[np.int_]

@@ -1,10 +1,9 @@
 """Figures of drawn pockets by the closed forms of their mechanism: pouch motor, hinge, inflated
-beam, jammed sheets, or a pouch that pushes.
+beam, jammed sheets, or a pushing pouch.
 
-Lengths and widths are measured on the laminate itself: a pocket is the open region round its
-chamber's centre without the inlet strips. None of these designs is calibrated, so their figures
-have no interval. All forces and moments are in proportion to the pressure. Lengths mm, pressures
-kPa.
+Lengths and widths are measured on the laminate: a pocket is the open region around its chamber's
+centre without the inlet strips. None of these designs is calibrated, so their figures have no
+interval. All forces and moments are proportional to the pressure. Lengths mm, pressures kPa.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ SEPARATE = 1e-3
 
 
 class MeasuredPocket(NamedTuple):
-    """A pocket as models take it: ``length`` along the mechanism and ``width`` across it, mm; the
+    """A pocket for the models: ``length`` along the mechanism and ``width`` across it, mm; the
     ``share`` of its bounding box that it fills, and its interface.
     """
 
@@ -53,7 +52,7 @@ class MeasuredPocket(NamedTuple):
 
     @property
     def film_stiffness(self) -> float | None:
-        """Young's modulus times thickness of the weaker film in N/mm; None if one is unknown."""
+        """Young's modulus times thickness of the less stiff film, N/mm; None if one is unknown."""
         films = self.interface.below.film, self.interface.above.film
         modulus = [film.elastic[0] * film.thickness for film in films if film.elastic is not None]
         return min(modulus) if len(modulus) == len(films) else None
@@ -94,7 +93,8 @@ def _pocket(
 def _chord(region: Region, centre: Point, axis: int, step: float = 0.0) -> float:
     """Return the chord of a region along x (``axis`` 0) or y through its centre.
 
-    With a step, the median of it and the chords that far off on both sides, to skip strips' mouths.
+    With a step, it is the median of this chord and those at that distance on both sides, to skip
+    the mouths of strips.
     """
     return sorted(_span(region, centre, axis, off) for off in (-step, 0.0, step))[1]
 
@@ -109,7 +109,7 @@ def _span(region: Region, centre: Point, axis: int, off: float) -> float:
 
 
 class Limit(NamedTuple):
-    """Pressure in kPa up to which a model holds, what happens beyond, and what would raise it."""
+    """The pressure limit of a model in kPa, the failure beyond it, and a way to raise it."""
 
     most: float
     beyond: str
@@ -121,7 +121,7 @@ UNLIMITED = Limit(math.inf, "", "")
 
 class FilledChamber(NamedTuple):
     """A chamber with its ``pockets``, all of one size, at ``pressures`` in kPa; ``of`` names it in
-    a figure's name, if there are several.
+    a figure's name if there are several.
     """
 
     mechanism: Mechanism
@@ -133,12 +133,12 @@ class FilledChamber(NamedTuple):
 
     @property
     def sizes(self) -> tuple[float, float]:
-        """Length and width of a pocket in mm."""
+        """The length and width of a pocket in mm."""
         return self.pockets[0].length, self.pockets[0].width
 
     @property
     def rows(self) -> tuple[int, int]:
-        """Numbers of pockets one after the other along the direction, and side by side."""
+        """The numbers of pockets in series along the direction, and side by side."""
         x, y = unit(self.mechanism.direction)
         centres = self.chamber.centres
         places = {round((px * x + py * y) / SEPARATE) for px, py in centres}
@@ -159,7 +159,7 @@ class FilledChamber(NamedTuple):
         return LeftOut(f"{name}{of}", reason, quantities)
 
     def not_straight(self, name: str, *quantities: Quantity) -> LeftOut | None:
-        """Return why models of straight seams do not hold; None if they do."""
+        """Return why models of straight seams are invalid; None if they are valid."""
         share = self.pockets[0].share
         if share >= RECTANGULAR:
             return None
@@ -186,8 +186,8 @@ class FilledChamber(NamedTuple):
         at: Conditions,
         limit: Limit = UNLIMITED,
     ) -> Iterator[FigureItem]:
-        """Yield a figure at each pressure up to the limit, and at the limit if that is below
-        all.
+        """Yield a figure at each pressure up to the limit, and at the limit if that is below all
+        pressures.
         """
         for pressure in self.pressures:
             here = at._replace(kpa=pressure)
@@ -207,7 +207,7 @@ class FilledChamber(NamedTuple):
 def mechanism_figures(
     mechanism: Mechanism, laminate: Laminate, pressures: Sequence[float]
 ) -> Iterator[FigureItem]:
-    """Yield the figures of a mechanism, chamber by chamber, and those left out with the reason."""
+    """Yield the figures of a mechanism by chamber, and the omitted ones with the reason."""
     for chamber in laminate.chambers:
         pockets = pockets_of(laminate, chamber, mechanism.direction) or []
         areas = [pocket.region.area for pocket in pockets]
@@ -269,7 +269,7 @@ def _hinge(filled: FilledChamber) -> Iterator[FigureItem]:
 
 
 def _plate_bend(laminate: Laminate, length: float) -> Limit:
-    """Return the pressure at which the plates' ends turn by ``MOST_TURN``: p a^3 / 6 D."""
+    """Return the pressure at which the plates' ends rotate by ``MOST_TURN``: p a^3 / 6 D."""
     films = [layer.film for layer in laminate.tpe_layers]
     stiffest = max((f.elastic[0] * f.thickness**3 / 12 for f in films if f.elastic), default=0.0)
     return Limit(

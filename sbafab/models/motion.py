@@ -1,7 +1,7 @@
 """Stacks in time: chambers that fill through their lines, in equilibrium at every instant.
 
-Freedoms and pressures of many states are found together by Newton's method; states that it does not
-solve soon go from equilibrium to equilibrium. Lengths mm, pressures kPa, volumes ul. Arrays have
+Freedoms and pressures of many states are solved together by Newton's method; states that do not
+converge soon go from equilibrium to equilibrium. Lengths mm, pressures kPa, volumes ul. Arrays have
 one row per state.
 """
 
@@ -45,14 +45,16 @@ TOLERANCE, LEAST_CONTENT = 1e-5, 20.0
 
 
 class Intake(NamedTuple):
-    """What n states take in from where they ``begin``: the ``contents`` (n, chambers) that they
-    have in ul at the end (of a gas at the atmosphere) but for the flow of ``acts`` (n, 1) s from
-    ``sources`` (n, chambers) in kPa, if these are valves; pumps may suck down to ``least`` kPa.
+    """The fluid that n states take in from their start ``begin``.
+
+    ``contents`` (n, chambers) are in ul at the end (for a gas, at atmospheric pressure) without the
+    flow during ``acts`` (n, 1) s from ``sources`` (n, chambers) in kPa, if these are valves; pumps
+    may draw down to ``least`` kPa.
 
     The content of a chamber's ``line`` counts as its own. The excess of volumes is the gradient of
     one function of the pressures, whose minimum is sought: volumes are slopes of a concave
-    potential, and more pressure lets less in. Pressures stay at or above the least, and a chamber
-    that would need less draws in the rest.
+    potential, and a higher pressure admits less. Pressures stay at or above the least, and a
+    chamber that would need less draws in the rest.
     """
 
     begin: BatchPoses
@@ -66,7 +68,7 @@ class Intake(NamedTuple):
     def of(
         cls, begin: BatchPoses, line: Line, acts: Array, sources: Array | None, flows: Any = 0.0
     ) -> Intake:
-        """Return that of valves at sources, or of pumps with ``flows`` (n, chambers) in ul/s."""
+        """The intake from valves at sources, or from pumps with ``flows`` (n, chambers) in ul/s."""
         # A pump that stands still is shut: its chamber may come to suction where a load bends it
         # open.
         least = -SUCTION if sources is None else 0.0
@@ -76,17 +78,17 @@ class Intake(NamedTuple):
 
     @property
     def more(self) -> float:
-        """Volume of a gas in the line."""
+        """The volume of a gas in the line."""
         return self.line.dead_volume + self.line.tube_volume if self.line.fluid.is_gas else 0.0
 
     def squeezed(self, pressures: Array) -> Array:
-        """Return contents by volumes: a gas is counted at the atmosphere."""
+        """Return contents from volumes: a gas is measured at atmospheric pressure."""
         is_gas = self.line.fluid.is_gas
         return 1 + pressures / ATMOSPHERE_KPA if is_gas else np.ones_like(pressures)
 
     def excess(self, volumes: Array, pressures: Array) -> tuple[Array, Array]:
-        """Return by how many ul the volumes are too large, and this by pressure at equal volumes:
-        (n, chambers) each.
+        """Return the excess of the volumes in ul, and its derivative with respect to pressure at
+        equal volumes: (n, chambers) each.
         """
         flow = rate = np.zeros_like(pressures)
         if self.sources is not None:
@@ -98,18 +100,18 @@ class Intake(NamedTuple):
         return whole - (self.contents + self.acts * flow) / squeezed, own / squeezed
 
     def at(self, where: Any) -> Intake:
-        """Return that of some of the states."""
+        """Return the intake of some of the states."""
         sources = None if self.sources is None else self.sources[where]
         contents, acts = self.contents[where], self.acts[where]
         return Intake(self.begin.part(where), self.line, contents, acts, sources, self.least)
 
     @property
     def ends(self) -> tuple[float, float]:
-        """Least and largest coordinate of a pressure."""
+        """The least and largest coordinate of a pressure."""
         return float(place_of(self.least)), float(place_of(self.begin.column.most_pressure))
 
     def taken(self) -> BatchPoses:
-        """Return the poses at the end. Raises DesignError for the first state that has none."""
+        """Return the poses at the end. Raises DesignError for the first state without one."""
         size = CHUNK if self.begin.load is None else LOADED_CHUNK
         parts = [slice(first, first + size) for first in range(0, len(self.begin), size)]
         states = BatchPoses.joined([self.at(part).together() for part in parts])
@@ -117,11 +119,11 @@ class Intake(NamedTuple):
         return states.replaced(rest, self.at(rest).descent()) if rest.size else states
 
     def ahead(self, which: Any, now: Linearised, x: Array, moves: Array) -> Array:
-        """Return Newton's steps of the pressures' coordinates (n, chambers) of some of the states,
-        as of ``derivatives.together``.
+        """Return Newton's steps of the pressure coordinates (n, chambers) of some of the states, as
+        for ``derivatives.together``.
 
-        With the freedoms' own steps put in, the volumes' rates by pressure are a matrix that is
-        symmetric and positive definite.
+        With the freedoms' own steps inserted, the derivatives of volumes with respect to pressure
+        are a symmetric positive definite matrix.
         """
         rate, filled = pressure_rate(x), now.filled(moves)
         wrong, own = self.at(which).excess(now.volumes + filled[..., 0], pressure_at(x))
@@ -144,7 +146,7 @@ class Intake(NamedTuple):
 
     def descent(self) -> BatchPoses:
         """Return the states, from equilibrium to equilibrium by Newton's method with a line search.
-        Raises DesignError for the first that has none.
+        Raises DesignError for the first without one.
         """
         ends, top = self.ends, self.begin.column.most_pressure
         x, share = np.maximum(place_of(self.begin.pressures), ends[0]), np.ones(len(self.begin))
@@ -155,7 +157,9 @@ class Intake(NamedTuple):
             lacks = (x >= ends[1]) & (wrong < 0)
             rests: Any = (np.abs(wrong) <= close) | (x <= ends[0]) & (wrong >= 0) | lacks
             if rests.all() and lacks.any():
-                raise DesignError(f"the chambers would need more than {top:g} kPa; ask for less")
+                raise DesignError(
+                    f"the chambers would need more than {top:g} kPa; reduce the volumes"
+                )
             if rests.all():
                 return now
             at, rate = linearised_poses(now), pressure_rate(x)
@@ -186,9 +190,9 @@ class Motion:
     """A moving stack: ``step`` it, then read ``pose``, ``time`` and ``sources``.
 
     ``time`` is in s, ``sources`` the pressure in kPa at each chamber's valve or pump; ``line``
-    feeds each chamber. Quasi-static: film and fluid have no inertia. ``load`` are keyword arguments
-    of ``Stack.pose`` beside pressures. A gas that is pumped fills the line's dead volume and tube
-    as well.
+    feeds each chamber. Quasi-static: film and fluid have no inertia. ``load`` holds keyword
+    arguments of ``Stack.pose`` other than pressures. A pumped gas also fills the line's dead volume
+    and tube.
     """
 
     stack: Column
@@ -200,7 +204,7 @@ class Motion:
 
     @property
     def pressures(self) -> tuple[float, ...]:
-        """Pressures in the chambers, kPa."""
+        """The pressures in the chambers, kPa."""
         return self.pose.pressures
 
     def step(
@@ -209,12 +213,12 @@ class Motion:
         pressures: Sequence[float] | None = None,
         flows: Sequence[float] | None = None,
     ) -> Pose:
-        """Return the pose ``dt`` s later, with pressures (kPa) at the valves or flows (ul/s, of a
-        gas at the atmosphere) of the pumps, one a chamber. Raises DesignError.
+        """Return the pose ``dt`` s later, with one pressure (kPa) at the valve or one flow (ul/s,
+        of a gas at atmospheric pressure) of the pump per chamber. Raises DesignError.
         """
         _refuse_time(dt)
         if (pressures is None) == (flows is None):
-            raise DesignError("a step takes either pressures or flows, one a chamber")
+            raise DesignError("a step takes either pressures or flows, one per chamber")
         count, given = self.stack.chambers, flows if pressures is None else pressures
         assert given is not None
         sentence = f"a step takes {count} finite numbers, one a chamber"
@@ -246,24 +250,24 @@ class BatchMotion:
     times: Array
 
     def restart(self, where: Any) -> None:
-        """Put some of the states (a mask, their numbers or a slice) at the start, at 0 s."""
+        """Reset some of the states (a mask, their numbers or a slice) to the start, at 0 s."""
         self.times[where] = 0.0
         self.poses = self.poses.replaced(where, self.start)
 
     @property
     def tips(self) -> Array:
-        """Middles of the top plates in mm: (N, 3)."""
+        """The middles of the top plates in mm: (N, 3)."""
         return self.poses.tips
 
     @property
     def pressures(self) -> Array:
-        """Pressures in the chambers, kPa: (N, chambers)."""
+        """The pressures in the chambers, kPa: (N, chambers)."""
         return self.poses.pressures
 
     @one_blas_thread
     def step(self, dt: float, pressures: ArrayLike) -> None:
-        """Move on by ``dt`` s with pressures (N, chambers) in kPa at the valves. Raises
-        DesignError as ``Motion.step`` does, for the first state that has no pose.
+        """Advance by ``dt`` s with pressures (N, chambers) in kPa at the valves. Raises DesignError
+        like ``Motion.step``, for the first state without a pose.
         """
         _refuse_time(dt)
         sources = self.poses.column.table(pressures, len(self.times))

@@ -1,5 +1,5 @@
-"""Measurements of the paper, and the counterparts of predicted figures that are off by more than a
-quarter of them.
+"""Measurements of the paper, and the counterparts of predicted figures that deviate from them by
+more than a quarter.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 class Measured(NamedTuple):
-    """A value +- its error (0 where none is given), its unit, and its section."""
+    """A value +- its error (0 if none is given), its unit, and its section."""
 
     value: float
     error: float
@@ -97,15 +97,15 @@ class Counterpart:
     """A measured value, and the model's value for the actuator on which it was measured: a row of
     ``paper_counterparts.csv``.
 
-    It stands beside figures of its ``quantities`` by its ``models`` (none: by any), at conditions
-    that meet ``at`` and are no less than ``at_least``; ``state`` is the quantity or state that was
-    ``measured``. ``parallel``: it holds for actuators that bend (True), for the others (False), or
-    for all (None). ``source`` names the template and the figure from which ``gave`` was taken, or
-    the value that ``docs/validation.md`` computes from its figures, in the unit of ``measured``;
-    ``where`` is the state in which the model gave it, if that is not the one of the measurement.
-    ``calibrated`` is the value with the calibration "paper" in the unit of ``measured``, None if it
-    is close or unchanged. A row may be far off with that calibration only. A row ``of_papers``
-    stands beside figures of the paper's own 3-DoF only.
+    It accompanies figures of its ``quantities`` by its ``models`` (none: by any), at conditions
+    that match ``at`` and are at least ``at_least``; ``state`` is the quantity or state that was
+    ``measured``. ``parallel``: it applies to actuators that bend (True), to others (False), or to
+    all (None). ``source`` names the template and the figure that was ``gave``, or the value that
+    ``docs/validation.md`` computes from its figures, in the unit of ``measured``; ``where`` is the
+    state of the model if it differs from the measurement's. ``calibrated`` is the value with the
+    calibration "paper" in the unit of ``measured``, None if it is close or unchanged. A row may
+    deviate with that calibration only. A row ``of_papers`` accompanies only figures of the paper's
+    3-DoF.
     """
 
     quantities: tuple[Quantity, ...]
@@ -163,7 +163,7 @@ class Counterpart:
 
 
 class CounterpartEntry(Document):
-    """What the paper measured, where the model is off by more than a quarter of it."""
+    """The paper's measurement, if the model deviates from it by more than a quarter."""
 
     sentence: str
     value: PlainNumber = attribute("measured.value")
@@ -178,7 +178,7 @@ class CounterpartEntry(Document):
 
 @cache
 def counterparts() -> tuple[Counterpart, ...]:
-    """Return all figures of predictions that validation shows to be off by more than MISFIT."""
+    """Return all figures of predictions that validation shows to deviate by more than MISFIT."""
     path = Path(__file__).with_name("paper_counterparts.csv")
     with path.open(encoding="utf-8", newline="") as opened:
         return tuple(_row(cells) for cells in csv.DictReader(opened))
@@ -211,9 +211,9 @@ def counterpart(
     calibration: str = "",
     of_papers: bool = False,
 ) -> Counterpart | None:
-    """Return the measured counterpart of a figure of this quantity by this model, for a design
-    of this ``form``, which may be the paper's own 3-DoF (``of_papers``); None if the model is
-    not known to be off by more than MISFIT.
+    """Return the measured counterpart of a figure of this quantity by this model, for a design of
+    this ``form``, which may be the paper's 3-DoF (``of_papers``); None if no deviation above MISFIT
+    is known.
 
     With a ``calibration`` (its name) it has the calibrated value.
     """

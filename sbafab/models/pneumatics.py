@@ -1,9 +1,9 @@
 """Supply of a chamber: fluid, tube, valve and pump, filling times (paper, Sec. 4.5 and 7), and the
 range of pressures.
 
-Flow through the tube is laminar (Poiseuille) or, where that is less, turbulent in a smooth tube
-(Blasius). A gas is isothermal: pressures squared take the place of pressures, and its volumes are
-counted at the atmosphere. Pressures kPa above the atmosphere, volumes ul, lengths mm, times s.
+Flow through the tube is laminar (Poiseuille) or, if that gives less flow, turbulent in a smooth
+tube (Blasius). A gas is isothermal: squared pressures replace pressures, and its volumes are
+measured at atmospheric pressure. Gauge pressures kPa, volumes ul, lengths mm, times s.
 """
 
 from __future__ import annotations
@@ -48,9 +48,9 @@ FLUIDS = {"water": WATER, "air": AIR}
 class Line:
     """The supply line of a chamber.
 
-    ``length`` and inner ``diameter`` of its tube in mm; ``dead_volume`` ul between pump and tube
-    (syringe, valve, fittings), where a gas is compressed before it flows; ``delay`` s until valve
-    or pump act.
+    ``length`` and inner ``diameter`` of its tube are in mm; ``dead_volume`` is in ul between pump
+    and tube (syringe, valve, fittings), where a gas is compressed before it flows; ``delay`` is the
+    response time of valve or pump in s.
     """
 
     fluid: Fluid = AIR
@@ -71,14 +71,14 @@ class Line:
 
     @property
     def tube_volume(self) -> float:
-        """Volume of the tube, ul."""
+        """The volume of the tube, ul."""
         return math.pi * self.diameter**2 / 4 * self.length
 
     @property
     def _conductance(self) -> tuple[float, float]:
-        """Laminar flow in ul/s by a kPa (Poiseuille), and turbulent flow at 1 kPa, which grows with
-        the pressure to the power of 1 / 1.75 (Blasius): 0.316 Re^-1/4 (length / diameter) density
-        speed^2 / 2, in kPa and mm.
+        """The laminar flow in ul/s per kPa (Poiseuille), and the turbulent flow at 1 kPa, which
+        increases with the pressure to the power of 1 / 1.75 (Blasius): 0.316 Re^-1/4 (length /
+        diameter) density speed^2 / 2, in kPa and mm.
         """
         laminar = math.pi * self.diameter**4 / (128 * self.fluid.viscosity * self.length)
         dense = self.fluid.density * 1e-9
@@ -87,11 +87,11 @@ class Line:
         return laminar, speed * math.pi * self.diameter**2 / 4
 
     def flow(self, source: float, chamber: float) -> float:
-        """Return ul/s, of a gas at the atmosphere, between pressures at pump and in chamber."""
+        """The flow in ul/s (of a gas at atmospheric pressure) from the pump to the chamber."""
         return float(self.flows(np.array(source), np.array(chamber))[0])
 
     def flows(self, sources: Array, chambers: Array) -> tuple[Array, Array]:
-        """Return ``flow`` in ul/s for pressures of any shape, and rates by those in chambers."""
+        """``flow`` in ul/s for pressures of any shape, and its derivatives for the chambers'."""
         drops, rates = sources - chambers, np.full(np.shape(chambers), -1.0)
         if self.fluid.is_gas:
             drops = drops * (1 + (sources + chambers) / (2 * ATMOSPHERE_KPA))
@@ -106,7 +106,7 @@ class Line:
         return flow, steep * rates
 
     def source_pressure(self, flow: float, chamber: float) -> float:
-        """Return the pressure in kPa at the pump that drives a flow (ul/s) into a chamber (kPa)."""
+        """Return the pump pressure in kPa that drives a flow (ul/s) into a chamber (kPa)."""
         laminar, turbulent = self._conductance
         drop = max(flow / laminar, float((flow / turbulent) ** 1.75))
         if not self.fluid.is_gas:
@@ -115,7 +115,7 @@ class Line:
         return math.sqrt(down * down + 2 * ATMOSPHERE_KPA * drop) - ATMOSPHERE_KPA
 
     def content(self, volume: float, pressure: float) -> float:
-        """Return the fluid in ul in a volume, of a gas at the atmosphere."""
+        """Return the fluid in ul in a volume; for a gas, at atmospheric pressure."""
         return volume * (1 + pressure / ATMOSPHERE_KPA) if self.fluid.is_gas else volume
 
 
@@ -132,8 +132,8 @@ def seconds(
 ) -> NDArray[np.float64]:
     """Return the seconds to a volume at a steady flow.
 
-    ``gas_at_kpa`` is the pressure that a gas is compressed to, above the atmosphere at which its
-    flow is counted; leave it for a liquid. Raises DesignError for a flow that no pump has.
+    ``gas_at_kpa`` is the gauge pressure to which a gas is compressed, while its flow is measured at
+    atmospheric pressure; omit it for a liquid. Raises DesignError for a flow out of range.
     """
     if not LEAST_FLOW <= flow_ml_min <= MOST_FLOW:
         raise DesignError(
@@ -151,13 +151,13 @@ MOST_PRESSURE = 1000.0
 
 
 def usual_pressures(form: Form) -> tuple[float, ...]:
-    """Return the pressures in kPa of a design's prediction; negative if it works under a vacuum."""
+    """Return the pressures in kPa of a design's prediction; negative if it works under vacuum."""
     return tuple(-kpa if form.works_under_vacuum else kpa for kpa in USUAL_PRESSURES)
 
 
 def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False, may_be_zero: bool = False) -> None:
-    """Raise DesignError for a pressure in kPa that no model takes: pressures of inflated pockets
-    are above 0, pressures of pockets that work under a vacuum below 0.
+    """Raise DesignError for a pressure in kPa that no model accepts: pressures of inflated pockets
+    must be positive, of pockets under vacuum negative.
     """
     low, high = (-ATMOSPHERE_KPA, 0.0) if is_vacuum else (0.0, MOST_PRESSURE)
     span = f"at least {low:g} and less than 0" if is_vacuum else f"more than 0, at most {high:g}"
@@ -166,6 +166,4 @@ def refuse_pressure(kpa: ArrayLike, is_vacuum: bool = False, may_be_zero: bool =
             continue
         hint = f"; a vacuum is negative: write {-each:g}" if is_vacuum and each > 0 else ""
         hint = "; it is inflated, and a vacuum does nothing" if not is_vacuum and each < 0 else hint
-        raise DesignError(
-            f"pressure = {each:g} kPa is out of range; give {span} kPa, as a gauge shows it{hint}"
-        )
+        raise DesignError(f"pressure = {each:g} kPa is out of range; give {span} kPa gauge{hint}")

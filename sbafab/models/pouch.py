@@ -1,19 +1,19 @@
-"""Pouches of film that does not stretch: as a motor that shortens, as a hinge that bends, as a beam
-that pressure makes stiff, and as a bag of sheets that a vacuum presses on each other.
+"""Pouches of inextensible film: a motor that shortens, a hinge that bends, a beam that pressure
+stiffens, and a bag of sheets that a vacuum presses together.
 
 A pouch of length L between two seams of width D fills to two arcs of half angle t that keep their
 length. The motor is the model of Niiyama et al., Soft Robotics 2 (2015) 59, doi
-10.1089/soro.2014.0023: length L sin t / t, volume D L^2 (t - sin t cos t) / 2 t^2, pull
-p D L cos t / t. The hinge is its pouch across the joint of two stiff plates: one film lies on them,
-the other is an arc over both. Its moment is our statics of that section: film tension p L / 2t at
-the plates' ends, less the pressure on a plate.
+10.1089/soro.2014.0023: length L sin t / t, volume D L^2 (t - sin t cos t) / 2 t^2, pull p D L cos t
+/ t. The hinge is such a pouch across the joint of two stiff plates: one film lies on them, the
+other is an arc over both. Its moment is from our statics of that section: film tension p L / 2t at
+the plates' ends, minus the pressure on a plate.
 
 The beam is a tube of film, bent as a cantilever: wrinkles start where the pressure's tension along
 the tube is used up, at a moment of pi p r^3 / 2, and it collapses at twice that (Comer and Levy,
 AIAA Journal 1 (1963) 1652, doi 10.2514/3.1873). A flat tube of width w opens to r = w / pi.
 
 Sheets in a bag (laminar jamming): until they slip, n sheets of thickness h bend as one of n h, n^2
-times as stiff as loose ones. They first slip where shear is largest, at the middle: 3 F / 2 b n h =
+times as stiff as loose ones. They first slip at the largest shear, at the middle: 3 F / 2 b n h =
 mu P of a cantilever. Mechanism and measurements: Narang, Vlassak and Howe, Adv. Funct. Mater. 28
 (2018) 1707136; the formulas come from beam theory.
 
@@ -40,14 +40,14 @@ SHALLOW = 1e-4
 
 
 def contraction(angle: ArrayLike) -> Array:
-    """Return by what share of its length a pouch is shorter at half angles up to pi/2."""
+    """Return the contraction of a pouch, as a fraction of its length, at half angles up to pi/2."""
     t = within(angle, math.pi / 2, "half angle", "rad", "pouch motor")
     safe = np.maximum(t, SHALLOW)
     return np.asarray(np.where(t > SHALLOW, 1 - np.sin(safe) / safe, t**2 / 6))
 
 
 def half_angle(share: ArrayLike) -> Array:
-    """Return the half angle at a contraction, a share. Raises DesignError out of range."""
+    """Return the half angle at a contraction (a fraction). Raises DesignError out of range."""
     shares = within(share, LARGEST_CONTRACTION, "contraction", "of its length", "pouch motor")
     return inverse(contraction, shares, math.pi / 2)
 
@@ -65,7 +65,7 @@ def volume(share: ArrayLike, length: float, width: float) -> Array:
 
 
 def pull(pressure: float, share: ArrayLike, length: float, width: float) -> Array:
-    """Return the pull in N at contractions above 0: flat it grows beyond every limit."""
+    """Return the pull in N at contractions above 0; it is unbounded for a flat pouch."""
     t = half_angle(share)
     return np.asarray(pressure / 1000 * width * length * np.cos(t) / t)
 
@@ -84,7 +84,7 @@ def bent(angle: ArrayLike) -> Array:
 
 
 def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> Array:
-    """Return the moment in N mm that bends the hinge on, at bends up to the free one."""
+    """Return the moment in N mm that bends the hinge further, at bends up to the free one."""
     b = within(bend, free_bend(), "bend of a hinge", "rad", "pouch hinge")
     t = half_angle(1 - np.cos(b / 2))
     safe = np.maximum(t, SHALLOW)
@@ -94,7 +94,7 @@ def moment(pressure: float, bend: ArrayLike, length: float, width: float) -> Arr
 
 @cache
 def free_bend() -> float:
-    """Return the bend in rad at which the moment is 0: of any pouch, at any pressure."""
+    """Return the bend in rad at zero moment: the same for any pouch and pressure."""
     pull = last_positive(lambda t: math.sin(t + float(bent(t)) / 2) - t / 2, 1.0, math.pi / 2)
     return float(bent(pull))
 
@@ -103,22 +103,22 @@ def free_bend() -> float:
 
 
 def tube_radius(width: float) -> float:
-    """Return the radius in mm that a flat tube of this width opens to."""
+    """Return the radius in mm to which a flat tube of this width opens."""
     return width / math.pi
 
 
 def wrinkling_moment(pressure: float, width: float) -> float:
-    """Return the moment in N mm at which its inner side goes slack."""
+    """Return the moment in N mm at which the inner side goes slack."""
     return math.pi * pressure / 1000 * tube_radius(width) ** 3 / 2
 
 
 def collapse_moment(pressure: float, width: float) -> float:
-    """Return the moment in N mm at which the slack goes all round."""
+    """Return the moment in N mm at which the whole circumference is slack."""
     return 2 * wrinkling_moment(pressure, width)
 
 
 def hoop_tension(pressure: float, width: float) -> float:
-    """Return the tension in N/mm round the tube, twice that along it."""
+    """Return the tension in N/mm around the tube, twice that along it."""
     return pressure / 1000 * tube_radius(width)
 
 

@@ -1,5 +1,5 @@
-"""All figures and curves that the models give for a design: sizes, stroke, force, work and time of
-chambers in step, bending and workspace of parallel ones, and their order in a prediction.
+"""All figures and curves that the models predict for a design: sizes, stroke, force, work and time
+of chambers in step, bending and workspace of parallel ones, and their order in a prediction.
 """
 
 from __future__ import annotations
@@ -120,8 +120,9 @@ def predict(
     ``quick`` leaves out curves and the elastic stack. If factors are given, intervals are not
     computed, and figures are not flagged for lying outside the checked part of a balloon's map.
 
-    Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
-    are out of range.
+    If factors are given, there are no intervals, and figures are not flagged for lying outside the
+    checked part of a balloon's map. Raises DesignError if the design cannot be built, or for
+    pressures, a flow or volumes that are out of range.
     """
     asked_request = request or PredictionRequest()
     uncertainty = None
@@ -182,13 +183,15 @@ def predict(
 def _built(
     uncertainty: Uncertainty | None, actuator: Actuator, request: PredictionRequest
 ) -> Uncertainty:
-    """Return what is known of an actuator by the values that were measured on it. Raises
-    DesignError for one that no calibrated model gives, or that contradicts the prediction.
+    """Return the uncertainty of an actuator given the values measured on it.
+
+    Raises DesignError for one that no calibrated model predicts, or that contradicts the
+    prediction.
     """
     if uncertainty is None:
         raise DesignError(
-            'measured values narrow what a calibration predicts, and models.calibration = "none"; '
-            "give a calibration or leave the measured values out"
+            "measured values narrow the prediction of a calibration, but models.calibration = "
+            '"none"; give a calibration or omit the measured values'
         )
     readings = []
     for text, quantity, at, value in request.measured:
@@ -214,11 +217,11 @@ def figure(
     pressures_kpa: Sequence[float] = (),
     probability: float | None = None,
 ) -> Figure:
-    """Return the figure of ``predict`` of one quantity at its conditions: by the calibrated model
-    if several give it, of several chambers the least. Balloons' maps reach ``pressures_kpa``. With
-    a ``probability`` it has its interval, flags and measured counterpart.
+    """Return the figure of ``predict`` for one quantity at its conditions: by the calibrated model
+    if there are several, and the smallest of several chambers.
 
-    Raises DesignError if no model gives it.
+    Balloons' maps extend to ``pressures_kpa``. With a ``probability`` it has its interval, flags
+    and measured counterpart. Raises DesignError if no model predicts it.
     """
     if at.share and quantity is Quantity.BLOCKED_FORCE:
         figure(design, laminate, Quantity.REFERENCE_STROKE)  # what the share is of
@@ -238,8 +241,9 @@ def figure(
 def _figure_of(
     items: Iterable[FigureItem], quantity: Quantity, at: Conditions, name: str
 ) -> Figure:
-    """Return the figure of a quantity at its conditions among items. Raises DesignError with the
-    reason why it is left out, or by the ``name`` of what asks for it.
+    """Return the figure of a quantity at its conditions among items.
+
+    Raises DesignError with the reason for its omission, or with the ``name`` of the request.
     """
     figures, left_out = [], []
     for item in items:
@@ -285,7 +289,7 @@ def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
 
 
 def _past_burst(laminate: Laminate, kpa: float) -> BeyondError | None:
-    """Return why there are no figures past the estimated burst pressure; None below it."""
+    """Return why there are no figures above the estimated burst pressure; None below it."""
     try:
         refuse_beyond_burst(laminate, kpa)
     except BeyondError as error:
@@ -294,9 +298,7 @@ def _past_burst(laminate: Laminate, kpa: float) -> BeyondError | None:
 
 
 def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
-    """Return a figure, flagged if its pressure is near the estimated burst, or left out if it is
-    past that.
-    """
+    """Return a figure, flagged if its pressure is near the estimated burst, omitted if above it."""
     if isinstance(item, LeftOut) or item.at.kpa is None:
         return item
     past = _past_burst(laminate, item.at.kpa)
@@ -309,7 +311,7 @@ def _flagged(item: FigureItem, laminate: Laminate) -> FigureItem:
 def _states(
     subject: Actuator, moved: Sequence[Factors], request: PredictionRequest, quick: bool
 ) -> list[elastic.Inflated]:
-    """Return an actuator inflated, and inflated at ``moved`` factors; ``quick`` without stacks."""
+    """Return an actuator inflated, also at ``moved`` factors; ``quick`` without stacks."""
     actuators = [subject, *(replace(subject, factors=factors) for factors in moved)]
     stacks = [None if quick else elastic.elastic_stack(subject, request)]
     first = stacks[0]
@@ -327,7 +329,7 @@ def _figures(
     checks_films: bool = True,
     checks_maps: bool = False,
 ) -> list[FigureItem]:
-    """Return all figures, and the ones left out, in the order of their groups."""
+    """Return all figures, including omitted ones, in the order of their groups."""
     items = list(_geometric_figures(state, request))
     if isinstance(state.stack, LeftOut):
         items.append(state.stack)
@@ -337,7 +339,7 @@ def _figures(
 
 
 def _geometric_figures(state: elastic.Inflated, request: PredictionRequest) -> Iterator[FigureItem]:
-    """Yield the figures that need no stack, of the groups that are wanted."""
+    """Yield the figures of the wanted groups that need no stack."""
     actuator, mass = state.actuator, _mass(state.actuator.laminate)
     form, laminate = actuator.form, actuator.laminate
     parts: list[tuple[str, Iterable[FigureItem]]] = [
@@ -365,7 +367,7 @@ def _geometric_figures(state: elastic.Inflated, request: PredictionRequest) -> I
 
 
 def _without_pockets(actuator: Actuator, request: PredictionRequest) -> Iterator[FigureItem]:
-    """Yield the figures of a mechanism, or why a drawn pocket has none."""
+    """Yield the figures of a mechanism, or the reason why a drawn pocket has none."""
     mechanism = actuator.form.mechanism
     if mechanism is not None:
         yield from mechanism_figures(mechanism, actuator.laminate, request.pressures_kpa)
@@ -383,9 +385,9 @@ def _without_pockets(actuator: Actuator, request: PredictionRequest) -> Iterator
 def _by_discs(
     items: list[FigureItem], bounds: Sequence[list[FigureItem]], discs: NearDiscs
 ) -> Iterator[FigureItem]:
-    """Yield figures by the disc of equal area, each between those by the discs of ``bounds``.
+    """Yield figures for the disc of equal area, each between those for the discs of ``bounds``.
 
-    A figure that one of the bounds lacks is left out.
+    A figure that one of the bounds lacks is omitted.
     """
     values_of = [
         {figure.key: figure.value for figure in bound if isinstance(figure, Figure)}
@@ -405,7 +407,7 @@ def _by_discs(
 
 
 def _by_disc(model: Model, discs: NearDiscs) -> Model:
-    """Return a model as applied to a disc in place of the drawn pocket."""
+    """Return a model applied to a disc in place of the drawn pocket."""
     return replace(
         model,
         by_disc=True,
@@ -416,7 +418,7 @@ def _by_disc(model: Model, discs: NearDiscs) -> Model:
 
 
 def _flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
-    """Yield upper bounds of the drawn pockets' blocked force, before plates part."""
+    """Yield upper bounds of the blocked force of drawn pockets, before the plates separate."""
     drawing = actuator.design.drawing
     if drawing is None or actuator.form.wrap is not None:
         return
@@ -429,7 +431,7 @@ def _flat_forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Fig
 
 
 def _sizes(actuator: Actuator) -> Iterator[Figure]:
-    """Yield flat sizes, and diameters round the tube for radial designs."""
+    """Yield flat sizes, and diameters around the tube for radial designs."""
     folded = actuator.folded
     factor = folded.factor if folded.molten else 1.0
     trust = "masks and films that do not melt in a press step keep their thickness"
@@ -448,7 +450,7 @@ def _sizes(actuator: Actuator) -> Iterator[Figure]:
 
 
 def _folding(actuator: Actuator) -> Iterator[FigureItem]:
-    """Yield the diameter of the channel that three folded lobes pass."""
+    """Yield the diameter of a channel that three folded lobes pass."""
     quantity, stacks = Quantity.FOLDED_DIAMETER, actuator.form.stacks
     if stacks != LOBES:
         reason = f"the model is of {LOBES} lobes folded into a triangle; this design has {stacks}"
@@ -486,7 +488,7 @@ def _tubes(actuator: Actuator) -> Iterator[FigureItem]:
 
 
 def _burst(laminate: Laminate, probability: float) -> Iterator[FigureItem]:
-    """Yield the burst pressure with its interval, which is ours."""
+    """Yield the burst pressure with our own interval."""
     estimate = burst(laminate)
     if estimate is None:
         yield LeftOut("burst pressure", NOT_BURST, (Quantity.BURST,))
@@ -583,9 +585,10 @@ def _forces(actuator: Actuator, request: PredictionRequest) -> Iterator[Figure]:
 
 
 def _power(actuator: Actuator, request: PredictionRequest, mass: FigureItem) -> Iterator[Figure]:
-    """Yield time, work, speed and power density, all of it at the volume of the reference stroke:
-    where that is not known only times to the volumes of the request, and without a mass no power
-    density.
+    """Yield time, work, speed and power density, all at the volume of the reference stroke.
+
+    Where that is unknown there are only times to the volumes of the request, and without a mass no
+    power density.
     """
     first, form, flow = actuator.pockets[0], actuator.form, request.flow_ml_min
     stroke, whole = actuator.reference_stroke, 0.0
@@ -632,9 +635,9 @@ class TipPath(NamedTuple):
 
 
 def _paths(actuator: Actuator, others_full: bool = False) -> list[TipPath]:
-    """Return one path for 1, 2 ... chambers next to each other; the others flat, or full.
+    """Return one path for each number of adjacent chambers; the others flat, or full.
 
-    A path ends where the top has turned by half a turn.
+    A path ends when the top has rotated by half a turn.
     """
     axes, stroke = actuator.axes, np.linspace(0, actuator.reference_stroke, SAMPLES)
     rest = actuator.reference_height if others_full else actuator.thickness
@@ -669,7 +672,7 @@ def _bending(actuator: Actuator) -> Iterator[FigureItem]:
 
 
 def plate_of(laminate: Laminate) -> Region | None:
-    """Return the profile of the topmost film, if it has neither tabs nor ears."""
+    """Return the profile of the topmost film if it has neither tabs nor ears."""
     if laminate.balloons == 1 or laminate.registration == "ears":
         return None
     return laminate.tpe_layers[-1].profile
@@ -741,7 +744,7 @@ def _trace(label: str, x: ArrayLike, y: ArrayLike, model: Model | None = None) -
 
 
 def _level(label: str, most: float, measured: Measured) -> Trace:
-    """Return the line of a value that the paper measured."""
+    """Return the line of a value measured by the paper."""
     return Trace(label, [0.0, most], [measured.value] * 2)
 
 
@@ -821,8 +824,8 @@ def _bending_relation(actuator: Actuator, request: PredictionRequest) -> Relatio
 
 
 def workspace_relation(actuator: Actuator, traces: Sequence[Trace] = ()) -> Relation:
-    """Return the paths of the tip in the plane in which neighbouring chambers bend; no lines of
-    constant curvature where the reference stroke is not known.
+    """Return the tip paths in the plane in which adjacent chambers bend; without constant-curvature
+    curves if the reference stroke is unknown.
     """
     rests = (("flat", False), ("full", True)) if actuator.has_reference else ()
     lines = []
@@ -839,7 +842,7 @@ def workspace_relation(actuator: Actuator, traces: Sequence[Trace] = ()) -> Rela
 
 
 def _diameter_relation(actuator: Actuator, tube: float) -> Relation:
-    """Return the diameter round the tube against the volume of a balloon."""
+    """Return the diameter around the tube against the volume of a balloon."""
     k, full = actuator.pockets[0], paper.RADIAL_FULL
     stroke = np.linspace(0, k.largest_stroke, SAMPLES)
     around = tube + 2 * (actuator.thickness + stroke)

@@ -1,6 +1,6 @@
 """Quantity and conditions of a predicted figure.
 
-Programs use these as keys. Display text is made from them here, and never parsed.
+Programs use these as keys. Display text is derived from them here and never parsed.
 """
 
 from __future__ import annotations
@@ -15,10 +15,10 @@ from sbafab.errors import DesignError
 class Conditions(NamedTuple):
     """State of the actuator for a figure; None if the figure does not depend on it.
 
-    ``kpa`` gauge, a vacuum below 0; ``share`` of the reference stroke, of a pocket's length by
-    which it is shorter, or of the free bend; ``rise`` in mm at which a force is blocked, in place
-    of a share; ``chambers`` pressurised, the others empty or flat;
-    ``angle`` of a bend in degrees; ``volume`` in ul a balloon; ``flow`` in ml/min; ``tube`` its
+    ``kpa`` is gauge pressure, negative for a vacuum; ``share`` is a fraction of the reference
+    stroke, of a pocket's length as contraction, or of the free bend; ``rise`` in mm at which a
+    force is blocked, instead of a share; ``chambers`` pressurised, the others empty or flat;
+    ``angle`` of a bend in degrees; ``volume`` in ul per balloon; ``flow`` in ml/min; ``tube`` its
     diameter in mm; ``hinges`` in a row. ``of`` names one chamber of several; ``each`` is "sba" for
     one actuator of several side by side, "pouch" for one pouch of several.
     """
@@ -42,14 +42,14 @@ class Conditions(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> Conditions:
-        """Return the conditions of a text such as "kpa=10,share=0.25". Raises ValueError or
-        KeyError for another.
+        """Return the conditions in a text such as "kpa=10,share=0.25". Raises ValueError or
+        KeyError for invalid text.
         """
         given = dict(part.split("=", 1) for part in text.split(",") if part)
         return cls(**{name: _CONDITIONS[name](value) for name, value in given.items()})
 
     def meet(self, asked: Conditions) -> bool:
-        """Return True if these are the conditions ``asked`` for, whatever that leaves open."""
+        """Return True if these match the conditions ``asked`` for, which may be incomplete."""
         mine = self.as_dict()
         return all(mine.get(name) == value for name, value in asked.as_dict().items())
 
@@ -59,8 +59,8 @@ ANYWHERE = Conditions()
 
 
 class Quantity(Enum):
-    """Quantities of figures: ``key`` for programs (the name in small letters), ``group`` in the
-    output, ``unit``, and the ``words`` of their names, with places for texts of the conditions.
+    """Quantities of figures: ``key`` for programs (the name in lower case), ``group`` in the
+    output, ``unit``, and the ``words`` of their names, with placeholders for conditions.
     """
 
     def __init__(self, group: str, unit: str, words: str) -> None:
@@ -161,12 +161,12 @@ class Quantity(Enum):
         if key not in keys:
             near = difflib.get_close_matches(key.replace(" ", "_"), keys, 3, 0.3)
             mends = f"did you mean {' or '.join(near)}?" if near else "each figure states its own"
-            raise DesignError(f"no quantity has the key {key!r}; {mends}")
+            raise DesignError(f"there is no quantity {key!r}; {mends}")
         return keys[key]
 
 
 def _texts(at: Conditions) -> dict[str, str]:
-    """Return conditions as texts for the names of figures."""
+    """Return conditions as text for the names of figures."""
     numbers = {name: f"{value:g}" for name, value in at.as_dict().items() if name not in _NAMES}
     share = at.share or 0.0
     stroke = f"at {100 * share:g} % of the reference stroke" if share else "flat"
@@ -261,7 +261,7 @@ class FigureKey(NamedTuple):
     model: ModelId
 
     def __str__(self) -> str:
-        """The key as a text for programs: blocked_force@kpa=10,share=0.25|elastic-stack."""
+        """The key as text for programs: blocked_force@kpa=10,share=0.25|elastic-stack."""
         at = ",".join(f"{name}={value}" for name, value in self.at.as_dict().items())
         return f"{self.quantity.key}@{at}|{self.model}"
 
@@ -274,7 +274,7 @@ class FigureKey(NamedTuple):
 
     @property
     def heading(self) -> str:
-        """Heading of the figure, with its model if several may give it, and its unit."""
+        """The heading of the figure, with its model if there are several, and its unit."""
         model = f", {self.model.words}" if self.quantity in BY_SEVERAL else ""
         return f"{self.quantity.named(self.at)}{model} [{self.quantity.unit}]"
 

@@ -1,10 +1,10 @@
 """Balloons with wide pockets, corrected for films that wave in step with their rim.
 
-``balloon`` lets the rim hinge about the pocket's edge and averages the films' wrinkles. Where a
-pocket is wide beside its ring, CalculiX shows films whose waves fall in step with the rim's, and an
-edge that moves with them: the balloon rises higher. The correction is fitted to 192 free balloons
-whose waves were resolved (docs/prediction.md): pockets of 4 to 17 ring widths in radius, films of
-0.027 to 0.27. Lengths mm, pressures kPa, volumes ul, energies uJ.
+``balloon`` lets the rim hinge about the pocket's edge and averages the films' wrinkles. If a pocket
+is wide compared with its ring, CalculiX shows film waves in step with the rim's, and an edge that
+moves with them: the balloon rises higher. The correction is fitted to 192 free balloons with
+resolved waves (docs/prediction.md): pockets of 4 to 17 ring widths in radius, films of 0.027 to
+0.27. Lengths mm, pressures kPa, volumes ul, energies uJ.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ POWER = 4
 
 
 def is_corrected(balloon: Balloon) -> bool:
-    """Return True for a wide pocket of equal films of the usual law."""
+    """Return True for a wide pocket with equal films of the default law."""
     usual = balloon.wrinkles and not balloon.inextensible and balloon.order == 2
     return usual and balloon.mate is None and balloon.pocket > WIDE * balloon.ring
 
@@ -67,15 +67,15 @@ def free_shapes(balloon: Balloon, pressure: ArrayLike) -> Shapes:
 def compressed_shapes(
     balloon: Balloon, pressure: ArrayLike, height: ArrayLike, tied: bool = False
 ) -> Shapes:
-    """Return balloons between plates at heights (mm), as of ``inflate``, eased by waves.
+    """Return balloons between plates at heights (mm), like ``inflate``, with the effect of waves.
 
-    Their energy is less by
+    Their energy is lower by
 
-        g = P h^n / (n H^(n - 1))
+    g = P h^n / (n H^(n - 1))
 
-    and straight on above H, where P is the pull that holds a balloon of ``inflate`` at the free
-    height H of one with waves. So forces are 0 at H, and those without waves where a balloon is
-    pressed flat. Volumes follow with the pressure's powers of P, near 1, and of H, near 1/3.
+    and by its tangent above H, where P is the pull that holds a balloon of ``inflate`` at the free
+    height H of one with waves. So forces are 0 at H, and equal those without waves for a balloon
+    pressed flat. Volumes follow from the powers of the pressure in P, near 1, and in H, near 1/3.
     """
     shapes = inflate(balloon, pressure, height, tied)
     if not is_corrected(balloon):

@@ -1,8 +1,9 @@
-"""Changes of free stroke and bend by a design's keys: diameter, film, modulus, number of balloons.
+"""Sensitivities of free stroke and bend to a design's keys: diameter, film, modulus, number of
+balloons.
 
-They are central differences of poses: for the modulus of all films by a small step, for maps scale
-with it exactly, for other keys by newly mapped balloons. The number of balloons is an integer: its
-rate is half the change by two.
+They are central differences of poses: for the modulus of all films by a small step, since maps
+scale with it exactly, for other keys by newly mapped balloons. The number of balloons is an
+integer: its derivative is half the change over two steps.
 """
 
 from __future__ import annotations
@@ -35,8 +36,8 @@ show more of their errors. And that of the modulus."""
 
 @dataclass(frozen=True)
 class SensitivityRow:
-    """Change in percent of the free ``stroke`` for 1 % more of a ``key``, and of the ``bend`` of
-    one chamber, None if it does not bend; the ratio of the changes.
+    """The change in percent of the free ``stroke`` for 1 % more of a ``key``, and of the ``bend``
+    of one chamber (None if it does not bend); the ratio of the changes.
     """
 
     key: str
@@ -48,7 +49,7 @@ class SensitivityRow:
 def sensitivity_table(design: Design, pressure: float) -> list[SensitivityRow]:
     """Return a row per key of KEYS for a pressure in kPa in all chambers, and in one for the bend.
 
-    Contacts of rims that open or close are smoothed over the step of a key. Raises DesignError for
+    Rim contacts that open or close are smoothed over the step of a key. Raises DesignError for
     pockets that are not round, and for a key that is not a single number.
     """
     factors = factors_of(design)
@@ -84,7 +85,7 @@ def _ends(
 
 
 def _change(ends: list[Stack], pose: Pose, measure: Callable[[Pose], float]) -> float:
-    """Return by how much a measure of poses at equal pressures differs between two stacks."""
+    """Return the difference of a measure of poses at equal pressures between two stacks."""
     low, high = (
         each.pose(pose.pressures, near=pose if len(each.levels) == len(pose.gaps) else None)
         for each in ends

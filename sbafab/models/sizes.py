@@ -28,16 +28,17 @@ def is_the_papers_3dof(form: Form, laminate: Laminate) -> bool:
 
 
 def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) -> dict[str, float]:
-    """Return sizes in mm by name: of the flat laminate and, for radial designs, round the tube.
+    """Return sizes in mm by name: of the flat laminate and, for radial designs, around the tube.
 
     Width, length and overall diameter include masks, inlet tabs and ears. The outline diameter is
     measured on the films without tabs and ears. The thickness is the sum of the films as bought,
     the folded height the sum after the press, which diameters round the tube contain twice. The
     default ``factors`` come from the design's calibration. Raises DesignError if it is unknown.
 
-    Of oblong pockets round a tube, the reached diameter is that of lenses at their largest volume,
-    to rely on, and the inflated one that of cylinders, the clearance to provide: 27.29 and 28.06
-    for the paper's, its films as bought, which says about 28 (Sec. 2.1).
+    For oblong pockets around a tube, the reached diameter is that of lenses at their largest
+    volume, the size to rely on, and the inflated one that of cylinders, the clearance to provide:
+    27.29 and 28.06 for the paper's with films as bought, where the paper states about 28 (Sec.
+    2.1).
     """
     height = (factors or factors_of(design)).folded(laminate).height
     low_x, low_y, high_x, high_y = laminate.bounds
@@ -63,7 +64,7 @@ def sizes(design: Design, laminate: Laminate, factors: Factors | None = None) ->
 
 
 def deflated_diameter(wrap: Wrap, height: float) -> float:
-    """Return the diameter in mm of tube and flat laminate of a height in mm; with the films as
+    """Return the diameter in mm of a tube with a flat laminate of a height in mm; with films as
     bought the paper's is 15.33 (Sec. 2.1).
     """
     return wrap.outer_diameter + 2 * height

@@ -1,14 +1,14 @@
 """A whole actuator in real time: plates joined by balloons, in equilibrium with external loads.
 
-Plates are the planes between balloons. Two neighbours are joined by one balloon a chamber: it
+Plates are the planes between balloons. Two neighbours are joined by one balloon per chamber: it
 lengthens and tilts, and carries no shear ("a 2-DoF spring joint", paper, Sec. 4.4). A tilted
-balloon is taken to push at six points of a ring, each as hard as the axisymmetric balloon does at
-the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
-disc's, and it is taken midway between neck and pocket. Flat balloons, and rims of leaning levels,
-do not sink into each other: contact by a stiff penalty, without friction.
-The equilibrium is the minimum of one energy, found by Newton's method, for many states at once; one
-pose is a batch of one. Levels of equal balloons without a load are equal and solved once.
-Lengths mm, pressures kPa, volumes ul; forces mN inside, N outside.
+balloon is assumed to push at six points of a ring, each with the force of the axisymmetric balloon
+at the gap there; between rigid plates that touch the film in a disc the ring's radius would be the
+disc's, and it is assumed midway between neck and pocket. Flat balloons, and rims of tilted levels,
+do not interpenetrate: contact by a stiff penalty, without friction. The equilibrium is the minimum
+of one energy, found by Newton's method, for many states at once; one pose is a batch of one. Levels
+of equal balloons without a load are equal and solved once. Lengths mm, pressures kPa, volumes ul;
+forces mN inside, N outside.
 """
 
 from __future__ import annotations
@@ -55,12 +55,12 @@ class Stack(Column):
     ``maps`` are the maps of the different balloons, ``levels`` the index of each level's map from
     the base; ``axes`` (chambers, 2) the centres of the chambers, ``pitch`` the height of a flat
     level and ``outline`` the radius of the plates, in mm; ``weight`` mN of each level, None if a
-    film's density is unknown; ``calibration`` the name of the one that its balloons have, if any.
+    film's density is unknown; ``calibration`` the name of the balloons' calibration, if any.
     """
 
     @property
     def counterparts(self) -> dict[str, str]:
-        """Measured counterparts of the "height" and the "bend" of a pose, a clause each."""
+        """The measured counterparts of the "height" and the "bend" of a pose, one clause each."""
         rows = counterparts_of_pose(self.chambers, self.calibration)
         return {quantity: row.sentence for quantity, row in rows.items()}
 
@@ -73,21 +73,21 @@ class Stack(Column):
         near: Pose | None = None,
         sucked: bool = False,
     ) -> Pose:
-        """Return the equilibrium pose at pressures (kPa, one a chamber).
+        """Return the equilibrium pose at pressures (kPa, one per chamber).
 
-        ``tip_load`` is a force in N on the middle of the top; ``gravity`` is True where the base
-        lies level, or the direction (3) of down; ``plate`` an outer plate, or its height in mm.
-        ``near`` is a pose to start from, such as the last one of a motion. Pressures may be below 0
-        only where chambers may be ``sucked``: shut, with a fluid that keeps its volume. Raises
-        DesignError for pressures outside the maps, and where Newton's method finds no equilibrium.
+        ``tip_load`` is a force in N on the middle of the top; ``gravity`` is True for a level base,
+        or the downward direction (3); ``plate`` is an outer plate, or its height in mm. ``near`` is
+        an initial pose, such as the previous pose of a motion. Pressures may be below 0 only if
+        chambers may be ``sucked``: closed, with a fluid of constant volume. Raises DesignError for
+        pressures outside the maps, and if Newton's method finds no equilibrium.
         """
         try:
             values = np.array(pressures, dtype=float)
         except (TypeError, ValueError):
-            raise DesignError("pressures must be numbers in kPa, one a chamber") from None
+            raise DesignError("pressures must be numbers in kPa, one per chamber") from None
         if values.shape != (self.chambers,):
             raise DesignError(
-                f"{values.size} pressures are given for {self.chambers} chambers; give one a "
+                f"{values.size} pressures are given for {self.chambers} chambers; give one per "
                 "chamber"
             )
         load = self.acting({"tip_load": tip_load, "gravity": gravity, "plate": plate})
@@ -95,15 +95,15 @@ class Stack(Column):
         return self.equilibria(values[None], load, start, sucked).pose()
 
     def derivatives(self, pressures: Sequence[float], **load: Any) -> Derivatives:
-        """Return the equilibrium pose at pressures (kPa, one a chamber) with its derivatives;
-        ``load`` are keyword arguments of ``pose`` beside pressures.
+        """Return the equilibrium pose at pressures (kPa, one per chamber) with its derivatives;
+        ``load`` holds keyword arguments of ``pose`` other than pressures.
 
-        Raises DesignError as ``pose`` does, and for a pose that is about to buckle.
+        Raises DesignError like ``pose``, and for a pose that is about to buckle.
         """
         return derivatives(self.states_of(self.pose(pressures, **load), self.acting(load)))
 
     def stiffness(self, pressures: Sequence[float], **load: Any) -> Array:
-        """Return the stiffness (6, 6) of the tip in N/mm, N and N mm, as of ``derivatives``."""
+        """Return the stiffness (6, 6) of the tip in N/mm, N and N mm, as in ``derivatives``."""
         return self.derivatives(pressures, **load).stiffness
 
     def reach(
@@ -113,25 +113,25 @@ class Stack(Column):
         near: Pose | None = None,
         **load: Any,
     ) -> Pose:
-        """Return a pose whose tip is at a place (3) in mm, within 1e-3 mm; its ``pressures`` (kPa)
+        """Return a pose with its tip at a place (3) in mm, within 1e-3 mm; its ``pressures`` (kPa)
         are from 0 to ``most_pressure``, by default the maps' highest.
 
-        ``near`` is a pose to start from, such as the last one of a motion; ``load`` are keyword
-        arguments of ``pose`` beside pressures. If a stack with many chambers has several solutions,
-        the result is one near the start. Raises UnreachableError, with the nearest tip found, and
-        DesignError for bad input.
+        ``near`` is an initial pose, such as the previous pose of a motion; ``load`` holds keyword
+        arguments of ``pose`` other than pressures. If a stack with many chambers has several
+        solutions, the result is one near the start. Raises UnreachableError, with the nearest tip
+        found, and DesignError for bad input.
         """
         place = vector_of(tip, "the place of the tip in mm")
         most = self.reach_limit(most_pressure)
         return reached(self, self.acting(load), place[None], most, near).pose()
 
     def reach_limit(self, most_pressure: float | None) -> float:
-        """Return the highest pressure in kPa of ``reach``. Raises DesignError."""
+        """Return the highest pressure in kPa for ``reach``. Raises DesignError."""
         most = self.most_pressure if most_pressure is None else float(most_pressure)
         if not 0 < most <= self.most_pressure:
             raise DesignError(
                 f"most_pressure = {most:g} kPa must be above 0 and at most "
-                f"{self.most_pressure:g} kPa, to which the stack was made"
+                f"{self.most_pressure:g} kPa, the range of the stack"
             )
         return most
 
@@ -139,7 +139,7 @@ class Stack(Column):
         self, pressures: Sequence[float] | None = None, line: Line | None = None, **load: Any
     ) -> Motion:
         """Return a motion that starts at pressures (kPa, by default 0); ``line`` feeds each
-        chamber, and ``load`` are keyword arguments of ``pose`` beside pressures.
+        chamber, and ``load`` holds keyword arguments of ``pose`` other than pressures.
         """
         start = self.pose((0.0,) * self.chambers if pressures is None else pressures, **load)
         return Motion(self, line or Line(), load, start)
@@ -157,24 +157,25 @@ class StackBatch:
     ) -> BatchPoses:
         """Return the equilibrium poses at pressures (N, chambers) in kPa.
 
-        ``near`` are N poses to start from; ``load`` are keyword arguments of ``Stack.pose`` beside
-        pressures. Raises DesignError as ``Stack.pose`` does, for the first state that has no pose.
+        ``near`` holds N initial poses; ``load`` holds keyword arguments of ``Stack.pose`` other
+        than pressures. Raises DesignError like ``Stack.pose``, for the first state without a pose.
         """
         table = self.stack.table(pressures)
         if near is not None and len(near.freedoms) != len(table):
             raise DesignError(
-                f"near has {len(near.freedoms)} poses for {len(table)} states; give one a state"
+                f"near has {len(near.freedoms)} poses for {len(table)} states; give one per state"
             )
         start = None if near is None else near.freedoms
         return self.stack.equilibria(table, self.stack.acting(load), start).met()
 
     @one_blas_thread
     def reach(self, tips: ArrayLike, most_pressure: float | None = None, **load: Any) -> BatchPoses:
-        """Return poses whose tips stand at places (N, 3) in mm, those that ``Stack.reach`` finds
-        one by one, with pressures from 0 to ``most_pressure`` in kPa.
+        """Return poses with tips at places (N, 3) in mm, equal to those of ``Stack.reach`` one by
+        one, with pressures from 0 to ``most_pressure`` in kPa.
 
-        ``load`` are keyword arguments of ``Stack.pose`` beside pressures. Raises UnreachableError
-        and DesignError as ``Stack.reach`` does, for the first place that is not met.
+        ``load`` holds keyword arguments of ``Stack.pose`` other than pressures. Raises
+        UnreachableError and DesignError like ``Stack.reach``, for the first place that is not
+        reached.
         """
         sentence = "positions of the tip in mm must be finite numbers, one row of three for each"
         places, most = numbers_of(tips, (None, 3), sentence), self.stack.reach_limit(most_pressure)
@@ -188,7 +189,7 @@ class StackBatch:
         **load: Any,
     ) -> BatchMotion:
         """Return ``count`` motions that start at pressures (kPa, by default 0); ``line`` feeds each
-        chamber, and ``load`` are keyword arguments of ``Stack.pose`` beside pressures.
+        chamber, and ``load`` holds keyword arguments of ``Stack.pose`` other than pressures.
         """
         if count < 1:
             raise DesignError(f"count = {count} must be at least 1")
@@ -208,10 +209,9 @@ def stack(
     """Return the stack of a design with round pockets on one axis or side by side.
 
     ``most_pressure`` in kPa is the range of its maps; maps of wide pockets end earlier. A lone
-    balloon is held by a small disc. ``factors`` are calibrated ones; ``form`` replaces the
-    design's, for drawn pockets that are nearly round (``actuator.model_form``). Raises
-    DesignError for pockets of another shape, for actuators round a tube and for films of unknown
-    modulus.
+    balloon is held by a small disc. ``factors`` are calibration factors; ``form`` replaces the
+    design's, for drawn pockets that are nearly round (``actuator.model_form``). Raises DesignError
+    for pockets of another shape, actuators around a tube and films of unknown modulus.
     """
     flat = laminate or build(design)
     factors = factors or Factors()
@@ -237,7 +237,7 @@ def stack(
 
 
 def _clamped(balloon: Balloon) -> Balloon:
-    """Return a balloon with a disc by which plates hold it, if it lacks a neck."""
+    """Return a balloon with a disc by which plates hold it, if it has no neck."""
     if balloon.neck:
         return balloon
     mate = None if balloon.mate is None else replace(balloon.mate, neck=GRIP * balloon.pocket)

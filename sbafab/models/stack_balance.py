@@ -1,4 +1,4 @@
-"""Least energy by Newton's method with a line search, of many states at once."""
+"""Energy minimisation by Newton's method with a line search, for many states at once."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ def descent(
     is_at_plate: bool,
 ) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_]]:
     """Return the equilibria downhill of freedoms (n, rows, 3), once their errors are below ``FINE``
-    or a step is no larger than ``enough``; the pushes (n) on a plate, which are stable and which
-    have been found.
+    or a step is no larger than ``enough``; the pushes (n) on a plate, and masks of stable states
+    and of those found.
 
     ``energies`` are those of some of the states, with gradients, second derivatives and pushes as
-    of ``Energy``.
+    in ``Energy``.
     """
     count = len(start)
     equilibria, pushes = start.copy(), np.zeros(count)
@@ -91,7 +91,7 @@ def newton_step(gradient: Array, matrix: Array) -> Array:
 
 
 def definite(matrix: Array) -> Array:
-    """Return matrices (..., size, size) with eigenvalues made positive where they are not."""
+    """Return matrices (..., size, size) with negative eigenvalues made positive."""
     bent = ~is_positive_definite(matrix)
     if not bent.any():
         return matrix
@@ -104,7 +104,7 @@ def definite(matrix: Array) -> Array:
 
 
 def step_limit(move: Array) -> Array:
-    """Return the share of steps (n, rows, 3) that stays within ``LARGEST_MOVE``: (n)."""
+    """Return the fraction of steps (n, rows, 3) that stays within ``LARGEST_MOVE``: (n)."""
     shares = LARGEST_MOVE / np.maximum(np.abs(move), 1e-12)
     return np.asarray(np.minimum(1.0, shares.min((1, 2))))
 
@@ -121,8 +121,8 @@ def is_positive_definite(matrix: Array) -> NDArray[np.bool_]:
 def bounded_solutions(matrix: Array, right: Array, least: Array, most: Array) -> Array:
     """Return the minima (n, size) of x @ matrix @ x / 2 - right @ x from ``least`` to ``most``.
 
-    Components beyond are clamped until the rest stays within: an active set that only grows,
-    sufficient for one of many steps.
+    Components beyond are clamped until the rest stays within: an active set that only grows, which
+    suffices for one of many steps.
     """
     size = matrix.shape[-1]
     tried = np.linalg.solve(matrix, right[..., None])[..., 0]

@@ -1,11 +1,11 @@
 """Energy of stacks under load, with first and second derivatives: kinematics of the chain of
 plates, springs of the levels, and external forces.
 
-A level has three freedoms: its rise (mm) and the tilt of its upper plate, a rotation vector in the
-lower plate's plane (rad). Half of the tilt comes before the rise and half after, as with constant
-curvature within a level. The first axis of arrays is that of states, the next one of levels, or of
-kinds of balloons where no load makes equal levels differ. Lengths mm, energies uJ, volumes ul,
-forces mN.
+A level has three degrees of freedom ("freedoms"): its rise (mm) and the tilt of its upper plate, a
+rotation vector in the lower plate's plane (rad). Half of the tilt comes before the rise and half
+after, as with constant curvature within a level. The first axis of arrays is that of states, the
+next that of levels, or of kinds of balloons if no load makes equal levels differ. Lengths mm,
+energies uJ, volumes ul, forces mN.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ class Chain(NamedTuple):
     3), whose columns are the plates' x, y and z; ``rises`` (n, levels, 3) are the levels'
     directions.
 
-    A level's tilt turns all beyond it about its middle: ``middles`` (n, levels, 3) in mm; ``turns``
-    (n, levels, 2, 3) are the rotations by a unit of either tilt.
+    A level's tilt rotates all plates beyond it about its middle: ``middles`` (n, levels, 3) in mm;
+    ``turns`` (n, levels, 2, 3) are the rotations per unit of either tilt.
     """
 
     places: Array
@@ -47,14 +47,15 @@ class Chain(NamedTuple):
 
     @property
     def tip(self) -> Array:
-        """Middle of the top plate in mm: (n, 3)."""
+        """The middle of the top plate in mm: (n, 3)."""
         return np.asarray(self.places[..., -1, :])
 
     def motions(self) -> Array:
-        """Return the motion of all plates beyond a level by a unit of each of its freedoms: (n,
+        """Return the motion of all plates beyond a level per unit of each of its freedoms: (n,
         levels, 3, 6).
 
-        The first three turn, the others move: a point x of these plates moves by turn x x + move.
+        The first three are rotations, the others translations: a point x of these plates moves by
+        turn x x + move.
         """
         motions = np.zeros((*self.rises.shape, 6))
         motions[..., 0, 3:] = self.rises
@@ -64,7 +65,7 @@ class Chain(NamedTuple):
 
 
 def plate_chain(freedoms: Array, pitch: float) -> Chain:
-    """Return the plates of levels with freedoms (..., levels, 3), each ``pitch`` mm high flat."""
+    """The plates of levels with freedoms (..., levels, 3), each ``pitch`` mm high when flat."""
     *lead, count, _ = freedoms.shape
     turned, rates = rotations(freedoms[..., 1:] / 2)
     axes = np.empty((*lead, count + 1, 3, 3))
@@ -86,9 +87,9 @@ def plate_chain(freedoms: Array, pitch: float) -> Chain:
 
 
 def rotations(vectors: Array) -> tuple[Array, Array]:
-    """Return rotations (..., 3, 3) by vectors (..., 2) in the xy plane, and the rotation by a unit
+    """Return rotations (..., 3, 3) from vectors (..., 2) in the xy plane, and the rotation per unit
     of each component, half before and half after, in the xy plane between (..., 2, 2): Rodrigues'
-    formula, and the mean of the left and the right Jacobian.
+    formula, and the mean of the left and right Jacobians.
     """
     x, y = vectors[..., 0], vectors[..., 1]
     xx, xy, yy = x * x, x * y, y * y
@@ -108,16 +109,16 @@ def rotations(vectors: Array) -> tuple[Array, Array]:
 
 
 def crossing(vectors: Array) -> Array:
-    """Return matrices (..., 3, 3) of the vector product of vectors (..., 3) with a row."""
+    """Return the matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
     return np.asarray((vectors @ FLAT_CROSS).reshape(*vectors.shape, 3))
 
 
 def force_motions(arms: Array, forces: Array) -> Array:
-    """Return moments and work of forces f at points x under motions as of ``Chain.motions``: (...,
+    """Return moments and work of forces f at points x under motions as in ``Chain.motions``: (...,
     6, 4).
 
-    From the sum of x f (..., 3, 3) and of f (..., 3) over the points. The first three of the last
-    axis are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
+    They follow from the sum of x f (..., 3, 3) and of f (..., 3) over the points. The first three
+    of the last axis are the sum of (motion of x) x f, the fourth is the sum of (motion of x) . f.
     """
     matrix = np.empty((*forces.shape[:-1], 6, 4))
     # (turn x x) x f is x (turn . f) less turn (x . f).
@@ -151,11 +152,11 @@ class GapPlaces(NamedTuple):
     """Points at which the gaps of levels are evaluated, at any pressure.
 
     ``kinds`` (rows, 1) are the rows' kinds of balloon; ``chambers`` (ring points) the chamber of
-    each point of the rings. ``meet`` (rows, 3, points) are all gaps that may close, by rise and
-    tilt: the rings' gaps, in pieces of the spline, then the rims' in mm. ``ring`` (rows, ring
-    points, 3) are the former, ``squares`` (rows, ring points, 9) their products, both as a point's
-    share of its balloon; ``shut`` (rows, points, 9) are the products of all gaps times the contact
-    stiffness.
+    each point of the rings. ``meet`` (rows, 3, points) are all gaps that may close, as functions of
+    rise and tilt: the rings' gaps, in pieces of the spline, then the rims' in mm. ``ring`` (rows,
+    ring points, 3) are the former, ``squares`` (rows, ring points, 9) their products, both as a
+    point's fraction of its balloon; ``shut`` (rows, points, 9) are the products of all gaps times
+    the contact stiffness.
     """
 
     kinds: NDArray[np.int_]
@@ -167,7 +168,7 @@ class GapPlaces(NamedTuple):
 
     @classmethod
     def of(cls, maps: Sequence[BalloonMap], gaps: Array, rims: Array) -> GapPlaces:
-        """Return one row per kind of balloon, with gaps at its ring and round its rim, in mm."""
+        """Return one row per kind of balloon, with gaps at its ring and around its rim, in mm."""
         count = gaps.shape[1]
         spans = np.array([[kind.spans] for kind in maps])
         ring = gaps * spans[..., None]
@@ -185,7 +186,7 @@ class GapPlaces(NamedTuple):
         )
 
     def at(self, levels: NDArray[np.int_]) -> GapPlaces:
-        """Return a row for each level; a single row if all are equal."""
+        """Return one row per level; a single row if all are equal."""
         if len(self.kinds) == 1:
             return self
         kinds, chambers, *parts = self
@@ -196,9 +197,9 @@ class Springs(NamedTuple):
     """Elastic response of rows of levels at given pressures, of n states, evaluated in ``places``.
 
     ``table`` (powers, rows) are the pieces of the splines of all potentials, of their volumes and,
-    if asked for, of the volumes' rates by pressure; ``begins`` (n, rows, ring points) is the row of
-    each point's first piece, ``stride`` leads from a piece to the next and ``step`` from a
-    potential to its volume.
+    if requested, of the volumes' derivatives with respect to pressure; ``begins`` (n, rows, ring
+    points) is the row of each point's first piece, ``stride`` leads from a piece to the next and
+    ``step`` from a potential to its volume.
     """
 
     table: Array
@@ -232,9 +233,10 @@ class Springs(NamedTuple):
     def order(
         self, freedoms: Array, number: ArrayLike, with_rates: bool = True
     ) -> tuple[Array, Array]:
-        """Return of each balloon its potential (order 0), its volume in ul (1) or the volume's rate
-        by pressure with all plates held (2), without contacts: (n, rows, chambers); and this by its
-        level's freedoms: (n, rows, chambers, 3). Several orders come first.
+        """Return for each balloon its potential (order 0), its volume in ul (1) or the volume's
+        derivative with respect to pressure with all plates held (2), without contacts: (n, rows,
+        chambers); and its derivative with respect to its level's freedoms: (n, rows, chambers, 3).
+        Several orders come first.
         """
         gaps = by_row(freedoms, self.places.meet)[..., : len(self.places.chambers)]
         steps = self.step * np.asarray(number)
@@ -262,10 +264,10 @@ class OuterPlate(NamedTuple):
     """An outer plate: the line (``point`` and ``normal``) on which the tip meets it; with
     ``sticks`` friction holds the tip on that line.
 
-    Points fixed to the top may not pass the plate: those round its rim, then, where it sticks, its
-    middle either way across the line. ``local`` (points, 3) are their places on the top in mm,
-    ``ways`` (points, 3) the constrained directions; ``least`` (points) the least depth in mm at
-    which each is in contact.
+    Points fixed to the top may not pass the plate: those around its rim, then, if it sticks, its
+    middle in both directions across the line. ``local`` (points, 3) are their positions on the top
+    in mm, ``ways`` (points, 3) the constrained directions; ``least`` (points) the least depth in mm
+    at which each is in contact.
     """
 
     point: Array
@@ -277,7 +279,7 @@ class OuterPlate(NamedTuple):
 
     @classmethod
     def of(cls, point: Array, normal: Array, sticks: bool, outline: float) -> OuterPlate:
-        """Return the plate for a top whose rim has the radius ``outline`` in mm."""
+        """Return the plate for a top with a rim radius ``outline`` in mm."""
         local, ways = outline * WALL_RIM, np.tile(normal, (WALL_POINTS, 1))
         least = np.zeros(WALL_POINTS)
         if sticks:
@@ -290,9 +292,7 @@ class OuterPlate(NamedTuple):
         return cls(point, normal, sticks, local, ways, least)
 
     def contact(self, plates: Chain, stiffness: float, forces: Array | None) -> PlateContact:
-        """Return the contact of the top, with ``forces`` in mN, or those by a stiffness in
-        mN/mm.
-        """
+        """Return the contact of the top, with ``forces`` in mN, or by a stiffness in mN/mm."""
         points = plates.tip[..., None, :] + self.local @ plates.axes[..., -1, :, :].swapaxes(-1, -2)
         deep = ((points - self.point) * self.ways).sum(-1)
         lines = np.empty((*points.shape[:-1], 6))
@@ -305,12 +305,11 @@ class OuterPlate(NamedTuple):
 
 
 class PlateContact(NamedTuple):
-    """Contact of the top with an outer plate at ``points`` (n, points, 3): their depth in mm,
-    ``deep`` (n, points), and its increase by a unit of each turn and move of ``Chain.motions``,
-    ``lines`` (n, points, 6).
+    """Contact of the top with an outer plate at ``points`` (n, points, 3).
 
-    ``stiff`` and ``least`` (points) are their stiffness and least depth; ``forces`` (n, points) in
-    mN.
+    ``deep`` (n, points) is their depth in mm, and ``lines`` (n, points, 6) its increase per unit of
+    each rotation and translation of ``Chain.motions``. ``stiff`` and ``least`` (points) are their
+    stiffness and least depth; ``forces`` (n, points) in mN.
     """
 
     points: Array
@@ -322,12 +321,12 @@ class PlateContact(NamedTuple):
 
     @property
     def push(self) -> Array:
-        """Force in mN on the plate: (n)."""
+        """The force in mN on the plate: (n)."""
         return np.asarray(self.forces[..., :WALL_POINTS].sum(-1))
 
     @property
     def stiff_touches(self) -> Array:
-        """Stiffness of the points in contact, 0 of others: (n, points)."""
+        """The stiffness of the points in contact, 0 for others: (n, points)."""
         return self.stiff * (self.deep > self.least)
 
     def resists(self, deep: Array) -> Array:
@@ -351,8 +350,8 @@ def _external_forces(
     plates: Chain, load: Load, touch: PlateContact | None
 ) -> tuple[Array, Array, Array]:
     """Return the sum of the external forces f beyond each level (n, levels, 3), the sum of x f over
-    their points x (n, levels, 3, 3), and their energy (n); one level stands for all if all carry
-    the same.
+    their points x (n, levels, 3, 3), and their energy (n); one level represents all if all carry
+    the same load.
     """
     tip = plates.tip[..., None, :]
     forces, arms = np.zeros(tip.shape) + load.tip, tip[..., None] * load.tip
@@ -374,11 +373,10 @@ def _external_forces(
 
 class Energy(NamedTuple):
     """Energies (n) in uJ with their gradients (n, freedoms) and second derivatives (n, groups,
-    size, size): groups of freedoms that do not act on each other are the rows without a load, and
-    all freedoms under one.
+    size, size).
 
-    Under a load, ``plates`` stand as ``motions`` (n, freedoms, 6) move them, and ``touch`` an outer
-    plate.
+    Groups are uncoupled freedoms: one per row without a load, and a single group with one. With a
+    load, ``plates`` are positioned by ``motions`` (n, freedoms, 6), and ``touch`` an outer plate.
     """
 
     value: Array
@@ -390,18 +388,18 @@ class Energy(NamedTuple):
 
     @property
     def push(self) -> Array:
-        """Force in mN on the outer plate: (n)."""
+        """The force in mN on the outer plate: (n)."""
         return np.zeros(self.value.shape) if self.touch is None else self.touch.push
 
     def deeper(self) -> Array:
-        """Return the contact's depths in mm by a unit of each freedom: (n, points, freedoms)."""
+        """Return the contact's depths in mm per unit of each freedom: (n, points, freedoms)."""
         assert self.touch is not None
         assert self.motions is not None
         return np.asarray(self.touch.lines @ self.motions.swapaxes(-1, -2))
 
     def solved(self, right: Array) -> Array:
-        """Return the solutions (n, freedoms, k) of the second derivatives by right sides. Raises
-        LinAlgError.
+        """Return the solutions (n, freedoms, k) of the second derivatives for right-hand sides.
+        Raises LinAlgError.
         """
         groups = self.matrix.shape[:3]
         moves = np.linalg.solve(self.matrix, right.reshape(*groups, -1))
@@ -441,19 +439,19 @@ def energy(
 
 @lru_cache(maxsize=16)
 def _base_side(count: int) -> Array:
-    """Return 1 where the row's level is nearer the base than the column's, 1/2 if equal."""
+    """Return 1 if the row's level is nearer the base than the column's, 1/2 if equal."""
     level = np.repeat(np.arange(count), 3)
     return np.asarray(np.heaviside(level[None, :] - level[:, None], 0.5))
 
 
 def _add_tilt_works(blocks: Array, works: Array, freedoms: Array, pitch: float) -> None:
-    """Take from second derivatives (n, levels, 3, 3) of the springs the ``works`` (n, levels, 3) of
-    the forces by the two tilts of one level, beyond their mean.
+    """Subtract from second derivatives (n, levels, 3, 3) of the springs the ``works`` (n, levels,
+    3) of the forces by the two tilts of one level, beyond their mean.
 
-    A point y from the level's middle moves by a x y with the turn a of a tilt. The second tilt,
-    with the turn b, changes that to second order by da/db x y + a x (b x y - c x s / 2); the mean
-    of a x (b x y) and b x (a x y) is counted elsewhere. s goes from plate to plate, c is the turn
-    of the level's first half, so that the middle shifts by c x s / 2.
+    A point y from the level's middle moves by a x y for the rotation a of a tilt. The second tilt,
+    with rotation b, changes that to second order by da/db x y + a x (b x y - c x s / 2); the mean
+    of a x (b x y) and b x (a x y) is included elsewhere. s goes from plate to plate, c is the
+    rotation of the level's first half, so that the middle shifts by c x s / 2.
     """
     (x, y), (tilt_x, tilt_y) = (
         np.moveaxis(freedoms[..., 1:], -1, 0) / 2,

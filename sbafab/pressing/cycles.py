@@ -25,8 +25,8 @@ ROUNDING = 1e-9
 class Runs:
     """Press cycles of ``copies``, side by side at these ``places``.
 
-    A place is the offset of a laminate's frame from the first laminate's frame, at the lower left;
-    rows fill from there. The last cycle may be smaller than the others.
+    A place is the offset of a laminate's frame from the first one's, at the lower left; rows fill
+    from there. The last cycle may be smaller than the others.
     """
 
     copies: int
@@ -34,12 +34,12 @@ class Runs:
 
     @property
     def together(self) -> int:
-        """Copies in a full cycle."""
+        """The copies in a full cycle."""
         return len(self.places)
 
     @property
     def cycles(self) -> tuple[int, ...]:
-        """Copies in each cycle."""
+        """The copies in each cycle."""
         full, rest = divmod(self.copies, self.together)
         return (self.together,) * full + ((rest,) if rest else ())
 
@@ -48,15 +48,15 @@ class Runs:
         return len(self.cycles)
 
     def position(self, copy: int) -> tuple[int, int]:
-        """Return the cycle and the place in which a copy is pressed; all count from 1."""
+        """Return the cycle and the place of a copy; all count from 1."""
         cycle, place = divmod(copy - 1, self.together)
         return cycle + 1, place + 1
 
 
 def serial(runs: Runs, copy: int, batch: str | None = None) -> str:
-    """Return the identity of a laminate from tray to tube: cycle and place, "A-03".
+    """Return the identity of a laminate throughout its manufacture: cycle and place, "A-03".
 
-    The name of the batch, if it has one, stands before them: "24-A-03".
+    The name of the batch, if any, is its prefix: "24-A-03".
     """
     cycle, place = runs.position(copy)
     width = max(2, len(str(runs.together)))
@@ -64,7 +64,7 @@ def serial(runs: Runs, copy: int, batch: str | None = None) -> str:
 
 
 def cycle_name(cycle: int) -> str:
-    """Return the letters of a cycle as of a spreadsheet's column: A, B, ... Z, AA."""
+    """Return the letters of a cycle, as for a spreadsheet's columns: A, B, ... Z, AA."""
     letters = ""
     while cycle:
         cycle, digit = divmod(cycle - 1, 26)
@@ -81,9 +81,10 @@ def press_runs(
 ) -> Runs:
     """Return runs with as many copies at once as fit the heated area (mm).
 
-    ``bounds`` are one copy's. ``margin`` mm of base plate surround all copies; the plate may lie
-    either way on the platen. If ``most`` limits the copies of a cycle, the cycles are as equal as
-    possible, since each place costs holes in the plate.
+    ``bounds`` are those of one copy. ``margin`` mm of base plate surround all copies; the plate may
+    lie in either orientation on the platen. If ``most`` limits the copies per cycle, the cycles are
+    as equal as possible, since each place costs holes in the plate.
+
     Copies are equal layer by layer, so every place of the press holds the same films at every
     height: the paper (Sec. 2) splits pressing if stacks of different cuts would share the pressure
     unevenly. Different designs are therefore never pressed together.
@@ -136,7 +137,7 @@ def _grid(room: tuple[float, float], size: tuple[float, float]) -> tuple[int, in
 
 
 class BatchTimes(NamedTuple):
-    """Minutes of a batch: in the press, by hand, and both in sequence; None if not stated."""
+    """The minutes of a batch: in the press, by hand, and both in sequence; None if not stated."""
 
     press: float | None
     hands: float | None
@@ -149,7 +150,7 @@ class BatchTimes(NamedTuple):
 
 
 def batch_times(runs: Runs, plan: Schedule) -> BatchTimes:
-    """Return the times of a batch: the press closes once a cycle; every copy needs the full hand
+    """Return the times of a batch: the press closes once per cycle; every copy needs the full hand
     work.
 
     Hand work while the press is closed is not subtracted.

@@ -1,14 +1,13 @@
-"""Dowel pins as they are sold, their seats in the base plate, and its holes.
+"""Commercial dowel pins, their seats in the base plate, and its holes.
 
 A pin stands on the shoulder of its hole: loose or tight, it can neither fall through nor be driven
-too deep, and its height over the plate is its length less the hole's depth. A narrower hole leads
-on through the plate, so that it is pushed out from below.
+too deep, and its height over the plate is its length minus the hole's depth. A narrower hole
+continues through the plate, so that the pin can be pushed out from below.
 
 Lengths, diameters and chamfers: ISO 8734:1997 (hardened) and ISO 2338:1997 (unhardened, m6 or h8:
-order m6). The standards themselves were not opened. Compared with the tables of FreeCAD's workbench
-for fasteners (FsData/iso8734*.csv, iso2338*.csv), all equal; against a table of ISO 8734 in the
-public part library of geop, equal from 1.5 mm up; chamfers of ISO 8734 against a transcription of
-its Table 1 in tscircuit's modelprinter, equal.
+order m6). The values are from secondary sources and equal those of FreeCAD's fasteners workbench
+(FsData/iso8734*.csv, iso2338*.csv), of geop's part library for ISO 8734 from 1.5 mm up, and, for
+chamfers of ISO 8734, of a transcription of its Table 1 in tscircuit's modelprinter.
 """
 
 from __future__ import annotations
@@ -93,8 +92,8 @@ ROUNDING = 1e-6
 class PinSetting:
     """One pin in one step: ``seat_mm`` of its length are in the plate, ``stands_mm`` above it.
 
-    The shoulder of its hole sets both. As pin and depth may be off, it stands up to
-    ``tolerance_mm`` lower or higher.
+    The shoulder of its hole sets both. Deviations of pin and depth change its height by up to
+    ``tolerance_mm``.
     """
 
     pin: str
@@ -109,8 +108,8 @@ class PinHole(NamedTuple):
     """The hole of one pin in the base plate, mm.
 
     It is reamed from above down to a shoulder at ``depth`` +- ``tolerance``, on which the pin
-    stands; below, it is ``push_out`` wide through the plate. ``lengths`` are the lengths of pins
-    used in it, shortest first.
+    stands; below, it is ``push_out`` wide through the plate. ``lengths`` are those of the pins used
+    in it, shortest first.
     """
 
     pin: str
@@ -137,12 +136,12 @@ def depth_tolerance(depth: float) -> float:
 
 
 def push_out(diameter: float) -> float:
-    """Return the diameter of the hole through which a pin is pushed out, mm, to 0.1."""
+    """Return the diameter of the hole for pushing a pin out, mm, to 0.1."""
     return round(PUSH_OUT * diameter, 1)
 
 
 def is_sold(diameter: float, standard: Standard) -> bool:
-    """Return True if the standard has pins of this diameter."""
+    """Return True if the standard lists pins of this diameter."""
     return any(abs(diameter - sold) < ROUNDING for sold in RANGES[standard])
 
 
@@ -152,7 +151,7 @@ def lengths_sold(
     """Return lengths in mm, shortest first: ``stock`` if given, else the standard's for the
     diameter.
 
-    A diameter that the standard does not have gets the whole series.
+    A diameter outside the standard gets the whole series.
     """
     if stock:
         return tuple(sorted(stock))
@@ -170,12 +169,12 @@ def settings_by_step(
     """Return the pins of every step, given its inserted pins and the height of its stack's top, mm,
     and the thickness of the plate.
 
-    The height is over the plate and includes every part under the stack. Holes of one diameter have
-    one depth, and a step with a higher stack needs longer pins. Of all depths that fit a plate
-    (``plate`` mm thick, or the thinnest sold that fits any) the chosen one lets pins stand least
-    over their stacks. Even the shortest pin in the deepest hole
-    stands over its stack by its chamfer. Raises DesignError if no pin is long enough, or the
-    plate too thin.
+    The height is measured from the plate and includes every part under the stack. Holes of one
+    diameter have one depth, and a step with a higher stack needs longer pins. Of all depths that
+    fit a plate (``plate`` mm thick, or the thinnest stock size that fits any) the chosen one
+    minimises the height of pins over their stacks. Even the shortest pin in the deepest hole
+    projects over its stack by its chamfer. Raises DesignError if no pin is long enough, or the
+    plate is too thin.
     """
     tops: dict[float, list[float]] = {}
     first: dict[float, str] = {}
@@ -227,7 +226,7 @@ def _setting(pin: Pin, height: float, choice: _Choice) -> PinSetting:
 def _choices(
     pin: str, diameter: float, tops: Sequence[float], sold: Sequence[float]
 ) -> list[_Choice]:
-    """Return depths with which some pin stands no higher than it must over a stack."""
+    """Return depths for which some pin has its minimum height over a stack."""
     needs = {top: top + chamfer(diameter) for top in tops}
     seat = max(LEAST_SEAT, SEAT * diameter)
     depths = {
@@ -248,36 +247,35 @@ def _choices(
         least = seat + depth_tolerance(seat) + max(needs.values())
         needed = next(least + off for limit, off in LENGTH_TOLERANCES if least + off <= limit)
         raise DesignError(
-            f"the pin {pin} (diameter {diameter:g}) must be at least "
-            f"{needed:.3f} mm long for a stack {max(tops):.3f} mm high, the "
-            "tolerances of pin and hole counted, and "
-            f"the longest there is has {sold[-1]:g}; give a longer one in registration.pin_lengths"
+            f"the pin {pin} (diameter {diameter:g}) must be at least {needed:.3f} mm long for a "
+            f"stack {max(tops):.3f} mm high, including the tolerances of pin and hole, but the "
+            f"longest available is {sold[-1]:g} mm; add a longer one to registration.pin_lengths"
         )
     return choices
 
 
 def _shortest(sold: Sequence[float], depth: float, need: float) -> float | None:
-    """Return the shortest pin that surely stands ``need`` mm over the plate, or None."""
+    """Return the shortest pin sure to stand ``need`` mm over the plate, or None."""
     off = depth_tolerance(depth)
     return next((n for n in sold if n - length_tolerance(n) - off >= depth + need - ROUNDING), None)
 
 
 def _thickness(choices: Mapping[float, Sequence[_Choice]], thickness: float | None) -> float:
-    """Return the plate's thickness in mm: as set, or the thinnest that takes every seat."""
+    """Return the plate's thickness in mm: as set, or the thinnest that fits every seat."""
     least = max((every[0].depth + FLOOR for every in choices.values()), default=0.0)
     if thickness is None:
         return _plate_sold(least)
     if thickness < least - ROUNDING:
         raise DesignError(
-            f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a pin's "
-            f"hole takes with {FLOOR:g} mm left under its shoulder; make it thicker, or give other "
-            "pins in registration.pin_lengths"
+            f"press.plate_thickness = {thickness:g} is thinner than the {least:g} mm that a "
+            f"pin's hole needs with {FLOOR:g} mm left under its shoulder; increase it, or change "
+            "registration.pin_lengths"
         )
     return thickness
 
 
 def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
-    """Return the plate's hole of every pin that some step uses, by the pin's name."""
+    """Return the base plate's hole for every pin in use, by the pin's name."""
     used: dict[str, list[PinSetting]] = {}
     for pin in chain.from_iterable(settings):
         used.setdefault(pin.pin, []).append(pin)
@@ -298,10 +296,10 @@ def pin_holes(settings: Sequence[Sequence[PinSetting]]) -> dict[str, PinHole]:
 def hole_notes(
     pins: Sequence[Pin], holes: Mapping[str, PinHole], machine: PlateMachine
 ) -> tuple[str, ...]:
-    """Return the notes on the plate's holes for a workshop, a line each, in letters a plotter has.
+    """Return a workshop's notes on the plate's holes, one per line, in a plotter's characters.
 
-    ``pins`` are all of a laminate; pins that no step uses do not need a shoulder. The only pin of
-    a plate needs just a reamed hole, wherever it is.
+    ``pins`` are all pins of a laminate; pins that no step uses do not need a shoulder. The only pin
+    of a plate needs just a reamed hole, wherever it is.
     """
     sizes = dict.fromkeys(
         (pin.diameter, holes[pin.name]._replace(pin="") if pin.name in holes else None)
@@ -322,5 +320,5 @@ def hole_notes(
 
 
 def _plate_sold(least: float) -> float:
-    """Return the thinnest plate sold that is ``least`` mm thick; a whole millimetre past these."""
+    """Return the thinnest stock plate of at least ``least`` mm; whole millimetres beyond these."""
     return next((plate for plate in PLATES if plate >= least - ROUNDING), float(math.ceil(least)))

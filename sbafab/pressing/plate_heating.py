@@ -1,4 +1,4 @@
-"""Warming of a base plate in the press and its cooling: the time-temperature line of a step."""
+"""Heating and cooling of a base plate in the press: the time-temperature curve of a step."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ MELTING, START, END = "melting point", "clock starts", "clock ends"
 
 @dataclass(frozen=True)
 class HeatPoint:
-    """A point of the line: ``edge_c`` of the plate's edge, ``after_constants`` and
+    """A point of the curve: ``edge_c`` of the plate's edge, ``after_constants`` and
     ``after_minutes`` from closing the press; None if unknown.
     """
 
@@ -39,8 +39,10 @@ class HeatPoint:
 
 @dataclass(frozen=True)
 class Heating:
-    """Parameters of the time-temperature line. ``melting_c`` is the highest melting point of the
-    structural films, ``time_constant_minutes`` the bench's; None if unknown.
+    """Parameters of the time-temperature curve.
+
+    ``melting_c`` is the highest melting point of the structural films, ``time_constant_minutes``
+    that of the bench; None if unknown.
     """
 
     start_c: float
@@ -64,7 +66,7 @@ class Heating:
         return self.platen_c - (self.platen_c - self.start_c) * math.exp(-minutes / tau)
 
     def line(self, minutes: float | None) -> tuple[HeatPoint, ...]:
-        """Return melting point, start and end of the clock of a step that lasts ``minutes``."""
+        """Return melting point, start and end of the clock for a step of ``minutes``."""
         start = self._point(START, self.clock_c)
         end = edge = None
         if minutes is not None and start.after_minutes is not None:
@@ -87,7 +89,7 @@ class Heating:
 
 
 def heating(laminate: Laminate, press: Press) -> Heating:
-    """Return the warming of the plate; the press must be hotter than its films melt."""
+    """Return the heating of the plate; the press must be hotter than the films' melting point."""
     platen_c = press.temperature_c
     tau = None if press.time_constant == NOT_MEASURED else press.time_constant
     films = {layer.film for layer in laminate.layers if not layer.is_mask}
@@ -122,14 +124,14 @@ still air. Handbook orders, ours: neither was measured in a press."""
 
 
 def warm_minutes(plate: float, platen_c: float) -> float:
-    """Return the estimated minutes in which a cold plate, ``plate`` mm thick, comes near the
-    platen's temperature.
+    """Return the estimated minutes for a cold plate, ``plate`` mm thick, to approach the platen's
+    temperature.
     """
     heat = STEEL * plate / 1000
     return round(heat / CONTACT * math.log((platen_c - ROOM) / CLOCK_SHORTFALL) / 60, 1)
 
 
 def cool_minutes(plate: float, platen_c: float) -> float:
-    """Return the estimated minutes in which a plate, hot as the platen, can be touched again."""
+    """Return the estimated minutes until a plate at platen temperature is safe to touch."""
     heat = STEEL * plate / 1000
     return round(heat / (2 * AIR) * math.log((platen_c - ROOM) / (TOUCH - ROOM)) / 60, 1)

@@ -1,9 +1,9 @@
 """The build-up between the platens, and the pressure that reaches the films: an estimate.
 
-The press gives a force. A pad, as large as the platen, spreads it: over a laminate the pad
-is compressed by the laminate's thickness more than beside it, and pushes back there the more.
+The press applies a force. A pad, as large as the platen, spreads it: over a laminate the pad is
+compressed by the laminate's thickness more than beside it, so its pressure there is higher.
 
-Nothing here was measured in a press. The pad is taken as linear, its modulus from its hardness.
+These are estimates, not measurements. The pad is assumed linear, with a modulus from its hardness.
 Lengths are mm, pressures kPa.
 """
 
@@ -47,7 +47,7 @@ class BuildUpPart:
 
 
 class StackShape(NamedTuple):
-    """Shape of the stacks under the pad: their height, area and length of rim, mm.
+    """The shape of the stacks under the pad: height, area and length of rim, mm.
 
     ``below`` is the height of the highest bond above the lowest, due to the masks over the latter.
     """
@@ -59,9 +59,10 @@ class StackShape(NamedTuple):
 
 
 class Pressures(NamedTuple):
-    """Estimated kPa: over the films, over their outer edge, over the lowest bond, and on the bare
-    plate beside them. ``free`` is the width in mm beside the edge where the pad does not reach the
-    plate.
+    """Estimated pressures in kPa: over the films, over their outer edge, over the lowest bond, and
+    on the bare plate beside them.
+
+    ``free`` is the width in mm beside the edge where the pad does not touch the plate.
     """
 
     film: float
@@ -72,12 +73,12 @@ class Pressures(NamedTuple):
 
 
 def gent_modulus(shore_a: float) -> float:
-    """Return Young's modulus in kPa of rubber of a Shore A hardness.
+    """Return Young's modulus in kPa of rubber with a Shore A hardness.
 
     A. N. Gent, On the relation between indentation hardness and Young's modulus, Trans. Inst.
-    Rubber Ind. 34 (1958) 46-57; its abstract says the relation with Shore hardness is approximate.
-    The numbers are quoted from other programs (the paper itself was not opened). Below
-    40 degrees it is extrapolated past its abstract's claim, and for a sponge it is an order.
+    Rubber Ind. 34 (1958) 46-57; its abstract calls the relation with Shore hardness approximate.
+    The constants are quoted from other programs (the paper itself was not opened). Below 40 degrees
+    it is extrapolated beyond its abstract's claim; for a sponge it gives the order of magnitude.
     """
     return 1000 * 0.0981 * (56 + 7.62336 * shore_a) / (0.137505 * (254 - 2.54 * shore_a))
 
@@ -95,7 +96,7 @@ def pad_modulus(press: Press) -> float:
 def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> StackShape:
     """Return the footprint of a stack of layers, given by index.
 
-    ``together`` such stacks lie below the pad side by side, far enough apart to be pressed equally.
+    ``together`` such stacks lie side by side below the pad, far enough apart for equal pressure.
     """
     films = [laminate.layer(index) for index in layers]
     widest = max(
@@ -116,8 +117,8 @@ def footprint(laminate: Laminate, layers: Sequence[int], together: int = 1) -> S
 def column_modulus(press: Press, thickness: float, under: StackShape) -> float:
     """Return the pad's modulus in kPa against the height of a stack.
 
-    A sponge gives way column by column. Solid rubber keeps its volume and must flow aside: E (1 +
-    2 S^2), S the pressed area over the free rim (Gent and Lindley, Proc. Inst. Mech. Eng. 173
+    A sponge compresses column by column. Solid rubber is incompressible and must flow sideways: E
+    (1 + 2 S^2), S the pressed area over the free rim (Gent and Lindley, Proc. Inst. Mech. Eng. 173
     (1959) 111, as Strojniski vestnik 60 (2014) 506, Eq. 1, quotes it: 2 is for unfilled rubber
     between plates it is bonded to).
     """
@@ -130,9 +131,9 @@ def column_modulus(press: Press, thickness: float, under: StackShape) -> float:
 def pressures(press: Press, thickness: float, under: StackShape) -> Pressures:
     """Return the pressures on a stack from the platen's pressure, in equilibrium with the force.
 
-    Near the edge the pad spans from the stack to the plate, as long as a soft half-space does
-    under its pressure (a gap of width w closes by about 2 p w / E), and half of what it carries
-    there lies on the outermost film.
+    Near the edge the pad spans from the stack to the plate, with the span of a soft half-space
+    under its pressure (a gap of width w closes by about 2 p w / E), and half of the load on that
+    span lies on the outermost film.
     """
     share = min(1.0, under.area / press.platen_area)
     more = column_modulus(press, thickness, under) * under.height / thickness
@@ -150,8 +151,8 @@ def pressures(press: Press, thickness: float, under: StackShape) -> Pressures:
 
 
 def pad_thickness(press: Press, stacks: Sequence[StackShape]) -> float:
-    """Return the pad's thickness in mm: the setting's, or the thinnest sold, or pile, that is even
-    enough.
+    """Return the pad's thickness in mm: the setting, or the thinnest sold pad or pile with an even
+    enough pressure.
 
     Raises DesignError if the set-up cannot give the pressure on the platen.
     """
@@ -220,10 +221,10 @@ def pressure_basis(press: Press, thickness: float, under: StackShape, estimate: 
 
 
 def unpressed(press: Press, stands_out: float) -> float:
-    """Return the width in mm round a protruding pin where the pad does not press."""
+    """Return the width in mm around a protruding pin where the pad does not press."""
     return stands_out * pad_modulus(press) / (2 * press.pressure_kpa)
 
 
 def pad_sheets(thickness: float) -> int:
-    """Return the number of sheets in the pile of a pad."""
+    """Return the number of sheets in a pad."""
     return max(1, math.ceil(thickness / PADS[-1] - 1e-9))

@@ -1,5 +1,5 @@
-"""The heat-press schedule: steps, their layers, pins, pressures and minutes, and the warnings for
-the technician.
+"""The heat-press schedule: steps, their layers, pins, pressures and minutes, and warnings for the
+technician.
 """
 
 from __future__ import annotations
@@ -50,12 +50,12 @@ from sbafab.pressing.press_force import (
 
 
 def joined_words(words: Sequence[str]) -> str:
-    """Return words as a list: one, two and three."""
+    """Return a list in words: one, two and three."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
 def layers_in_words(layers: Sequence[int]) -> str:
-    """Return text for layer indices; never 2-3, which a spreadsheet reads as a date."""
+    """Return layer indices as text; never 2-3, which a spreadsheet reads as a date."""
     runs = [
         [index for _, index in run]
         for _, run in groupby(enumerate(layers), lambda pair: pair[1] - pair[0])
@@ -69,9 +69,9 @@ def layers_in_words(layers: Sequence[int]) -> str:
 
 
 class Caution(NamedTuple):
-    """A warning for the technician; its ``remedy`` in a design file is the designer's.
+    """A warning for the technician; its ``remedy`` in a design file is for the designer.
 
-    ``at_step``: the step's own page says it where the layer is laid.
+    ``at_step``: the step's page repeats it where the layer is laid.
     """
 
     words: str
@@ -80,7 +80,7 @@ class Caution(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """Warning and remedy, for the designer."""
+        """The warning and the remedy, for the designer."""
         return f"{self.words}; {self.remedy}" if self.remedy else self.words
 
 
@@ -122,8 +122,8 @@ HANDLING_MINUTES = 60.0
 
 
 def minutes_closed(press: Press, step: StepName) -> float | None:
-    """Return the minutes that the press stays closed in a step, None if not known; tacking is a
-    flash bond.
+    """Return the minutes that the press stays closed in a step, None if unknown; tacking is a flash
+    bond.
     """
     minutes: float | None = getattr(press, STEPS[step][2])
     return minutes
@@ -137,8 +137,7 @@ class Step:
     names the inserted dowel pins, ``pin_settings`` gives their length and depth. ``pressure_kpa``
     is the force over the whole platen; ``film_kpa`` and the others are the pressures under the pad
     (``build_up.Pressures``). ``build_up`` goes from the lower platen up. ``minutes`` are None if
-    they are not stated for the film; they count from the start of the clock in
-    ``time_temperature``.
+    they are not stated for the film; they start with the clock in ``time_temperature``.
     """
 
     step: int
@@ -166,12 +165,12 @@ class Step:
 
     @property
     def stack_mm(self) -> float:
-        """Height of the stack that is pressed."""
+        """The height of the pressed stack."""
         return next(item.thickness_mm for item in self.build_up if item.part == LAMINATE)
 
     @property
     def top_mm(self) -> float:
-        """Height of the stack's top over the base plate, including every part under the stack."""
+        """The height of the stack's top over the base plate, with every part under the stack."""
         under = 0.0
         for item in self.build_up:
             if item.part == LAMINATE:
@@ -185,8 +184,8 @@ class SeamStep:
     """One seam made by a tool, counted among all steps.
 
     ``layers`` are in the work, and ``adds`` are laid in this step. ``length_mm`` is the length of
-    the path that the middle of the tool follows. Temperature and speed are None if not stated.
-    ``from_below``: the work is turned over, and the path mirrored.
+    the tool's centre path. Temperature and speed are None if not stated. ``from_below``: the work
+    is turned over, and the path mirrored.
     """
 
     step: int
@@ -223,8 +222,8 @@ class Schedule:
     """All steps, their time, and warnings for the technician.
 
     Warnings are ``cautions``, and ``remarks`` on waived rules and lowered limits. The two totals
-    are None if the minutes of any step are None; they exclude warming up. If not ``is_timed``, the
-    hand work has not been timed, so no total is stated.
+    are None if the minutes of any step are None; they exclude warm-up. If not ``is_timed``, the
+    hand work has no stated time, so there is no total.
     """
 
     steps: tuple[Step, ...]
@@ -247,11 +246,11 @@ class Schedule:
 def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,)) -> Schedule:
     """Return the press steps of a laminate, bottom balloon first.
 
-    Flash bonds hold layers in place on their pins. Full bonds are pressed without any, as in the
-    paper; with ears a flash bond on the pins comes before each. Raises DesignError at a temperature
-    that would not bond the films or is too high for one of them or the pad, and if pad, pins
-    or plate do not fit the laminate. ``together`` are the laminates that lie in the press at
-    once, one number for each size of cycle, the largest first: they share the force.
+    Flash bonds hold layers in place on their pins. Full bonds are pressed without pins, as in the
+    paper; with ears a flash bond on the pins precedes each. Raises DesignError at a temperature
+    that would not bond the films or is too high for one of them or the pad, and if pad, pins or
+    plate do not fit the laminate. ``together`` are the laminates that share the press, one number
+    for each size of cycle, the largest first.
     """
     press = design.press
     refuse_temperature(laminate, press)
@@ -328,7 +327,7 @@ def _underlay(laminate: Laminate, part: LayUpStep, press: Press) -> float:
 
 
 class _Bed(NamedTuple):
-    """What a stack is pressed with: thickness of pad, plate and underlay, mm, and its pins."""
+    """The set-up around a stack: thickness of pad, plate and underlay, mm, and its pins."""
 
     pad: float
     plate: float
@@ -410,7 +409,7 @@ def _items(press: Press, bed: _Bed, size: tuple[float, float]) -> Iterator[Build
 
 
 def _instructions(part: LayUpStep, count: int) -> str:
-    """Return the instructions of a step that makes ``count`` stacks beside each other."""
+    """Return the instructions of a step that makes ``count`` stacks side by side."""
     pins = [pin.name for pin in part.pins]
     stacks = ", then ".join(layers_in_words(stack) for stack in part.stacks if stack)
     on_pins = f"on the pin{'s' if len(pins) > 1 else ''} {joined_words(pins)}"
@@ -542,13 +541,13 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
             )
     if press.temperature_c > press_force.PAD_LIMIT_C:
         raise DesignError(
-            f"{is_set} is more than the press pad of {press.pad_material} stands, "
+            f"{is_set} exceeds the limit of a press pad of {press.pad_material}, "
             f"{press_force.PAD_LIMIT_C:g} C; lower it"
         )
 
 
 def _refuse_bonds(laminate: Laminate, press: Press, is_set: str) -> None:
-    """Raise DesignError if the press is too cold for its bonds, or too hot for seams in it."""
+    """Raise DesignError if the press is too cold for its bonds, or too hot for later seams."""
     parts = [set(part.layers) for part in press_steps(laminate)]
     for gap in laminate.interfaces:
         below, above = gap.below.index, gap.above.index
@@ -565,9 +564,9 @@ def _refuse_bonds(laminate: Laminate, press: Press, is_set: str) -> None:
             melts = None if bond is None else bond.temperature_c
             if melts is not None and melts <= press.temperature_c:
                 raise DesignError(
-                    f"{is_set} would weld layers {below} and {above} all over, which seam "
-                    f"{seam.name} bonds at {melts:g} C and leaves open elsewhere; press before the "
-                    "seam, lower the temperature, or lay a mask between them"
+                    f"{is_set} would weld the whole area of layers {below} and {above}, which "
+                    f"seam {seam.name} bonds locally at {melts:g} C; press before the seam, "
+                    "lower the temperature, or add a mask between them"
                 )
 
 
@@ -642,8 +641,8 @@ STATED_C = 135.0
 def _of_films(laminate: Laminate, press: Press, parts: Sequence[LayUpStep]) -> Iterator[Caution]:
     """Yield warnings of films without stated minutes or melting point, or pressed too hot.
 
-    The paper's minutes are for its temperature. The user stated all other minutes, also for films
-    that the paper did not press, and tried them as set.
+    The paper's minutes apply to its temperature. The user stated all other minutes, including those
+    for films that the paper did not press.
     """
     heat, pressed = f"{press.temperature_c:g} C", pressed_layers(laminate)
     untimed = films_without_minutes(laminate, press.timed_films)

@@ -38,7 +38,7 @@ class PressDocument(Document, schema="sbafab/press@1"):
 
 
 def press_json(plan: Schedule, **more: object) -> dict[str, Any]:
-    """Return ``press.json``; empty seams, folds and reasons are left out."""
+    """Return ``press.json``; empty seams, folds and reasons are omitted."""
     hands = HANDLING_MINUTES if plan.is_timed else None
     document = PressDocument.of(plan, hands_minutes=hands, **more)
     for step in document["steps"]:
@@ -48,7 +48,7 @@ def press_json(plan: Schedule, **more: object) -> dict[str, Any]:
 
 
 def heat_words(point: HeatPoint) -> str:
-    """Return one point of the time-temperature line as in the table."""
+    """Return one point of the time-temperature curve as in the table."""
     edge = "" if point.edge_c is None else f", {point.edge_c:g} C"
     after = "" if point.after_constants is None else f", after {point.after_constants:g} tau"
     minutes = "" if point.after_minutes is None else f", {point.after_minutes:g} min"
@@ -92,7 +92,7 @@ COLUMNS: Mapping[str, Callable[[Step], object]] = {
 
 
 def press_csv(plan: Schedule) -> str:
-    """Return the steps as a table, one row each, with units in the column names."""
+    """Return the steps as a table, one row per step, with units in the column names."""
     return csv_text(
         [[*COLUMNS], *([cell(step) for cell in COLUMNS.values()] for step in plan.steps)]
     )

@@ -52,10 +52,10 @@ PAPERS = ("aperture", "brace", "standing")
 
 @dataclass(frozen=True)
 class AssemblyFigure:
-    """One figure of a part: value in ``unit``, model, and the paper's remark, if any.
+    """A quantity of one part: value in ``unit``, model, and the paper's remark, if any.
 
-    ``measured`` is the paper's value for a single actuator, if the model is off by more than a
-    quarter of it.
+    ``measured`` is the paper's value for a single actuator if the model deviates from it by more
+    than a quarter.
     """
 
     part: str
@@ -69,7 +69,7 @@ class AssemblyFigure:
 
 @dataclass(frozen=True)
 class Touch:
-    """Two parts that share ``volume`` mm3 when the first one is inflated."""
+    """Two parts that intersect in ``volume`` mm3 when the first one is inflated."""
 
     part: str
     other: str
@@ -78,10 +78,10 @@ class Touch:
 
 @dataclass(frozen=True)
 class BentTouch:
-    """An arm that shares ``volume`` mm3 with another part when its ``chambers`` are pressed.
+    """An arm that intersects another part in ``volume`` mm3 when its ``chambers`` are pressurised.
 
     Contact begins at about ``from_kpa``, at a bend of ``bend`` degrees; ``measured`` is the paper's
-    bend if the model is off by more than a quarter of it.
+    bend if the model deviates from it by more than a quarter.
     """
 
     part: str
@@ -95,9 +95,9 @@ class BentTouch:
 
 @dataclass(frozen=True)
 class AssemblyPrediction:
-    """Figures at ``pressure_kpa``; ``touches`` are parts that collide when all are upright,
-    ``bent_touches`` contacts of bent arms; ``left_out`` names what no model covers, ``near_burst``
-    the parts above half of their estimated burst pressure.
+    """Figures at ``pressure_kpa``. ``touches`` are parts that collide when all are upright,
+    ``bent_touches`` contacts of bent arms; ``left_out`` names quantities without a model,
+    ``near_burst`` the parts above half of their estimated burst pressure.
     """
 
     name: str
@@ -137,8 +137,8 @@ def predict_assembly(
 ) -> AssemblyPrediction:
     """Predict the parts at one pressure, with a mass at the tips; the paper's marble has 1.2 g.
 
-    ``pause`` is called between parts of the work, which takes seconds; an exception from it stops
-    the work. Raises DesignError for pressures beyond the models or a part's estimated burst.
+    ``pause`` is called between parts of the work, which takes seconds; an exception in it stops the
+    work. Raises DesignError for pressures beyond the models or a part's estimated burst.
     """
     actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     for placed in actuators:
@@ -217,11 +217,11 @@ def _arm_figures(
 
 
 class Grip(NamedTuple):
-    """A radial actuator: diameters ``deflated``, inflated ``free``, out of any lumen, and ``most``,
-    the upper end, in mm.
+    """A radial actuator: diameters ``deflated``, inflated ``free`` of any lumen, and ``most``, the
+    upper end, in mm.
 
-    In the assembly's ``lumen`` a balloon is ``room`` mm high; each stack pushes on the wall with
-    ``push`` N per kPa. Both are None if it reaches no lumen.
+    In the assembly's ``lumen`` a balloon is ``room`` mm high; each stack presses on the wall with
+    ``push`` N per kPa. Both are None if it does not reach a lumen.
     """
 
     part: str
@@ -234,7 +234,7 @@ class Grip(NamedTuple):
 
     @property
     def why_none(self) -> str:
-        """The reason why the hold in the lumen is left out."""
+        """The reason why the grip in the lumen is omitted."""
         if self.lumen is None:
             return "no lumen is given: set deploy.lumen_diameter"
         if self.deflated >= self.lumen:
@@ -250,7 +250,7 @@ class Grip(NamedTuple):
 
 
 def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
-    """Return the hold of a radial actuator in the assembly's lumen; None for other forms."""
+    """Return the grip of a radial actuator in the assembly's lumen; None for other forms."""
     design, laminate = placed.made.design, placed.made.laminate
     form, pockets = design.form, design.form.pockets
     if not isinstance(pockets, Slots):
@@ -273,7 +273,7 @@ def grip(assembled: Assembled, placed: PlacedSba) -> Grip | None:
 def _grip_figures(
     hold: Grip, stacks: int, pressure: float, load_g: float
 ) -> Iterator[AssemblyFigure]:
-    """Yield diameters of a radial actuator, and the hold of its stacks in the assembly's lumen."""
+    """Yield diameters of a radial actuator, and the grip of its stacks in the assembly's lumen."""
     widest, height, push, friction = "about 28 (Sec. 2.1)", *IN_THE_LUMEN
     rows = [
         ("diameter, deflated", hold.deflated, "mm", "tube and films", "15.33 (Sec. 2.1)"),
@@ -326,8 +326,8 @@ class _Scene:
         return {p.name: self._solids(p, self.poses) for p in self.assembled.parts if _is_seen(p)}
 
     def _move(self, placed: PlacedPart, poses: Mapping[str, Pose]) -> Array:
-        """Return the matrix (4, 4) by which actuators in these poses move a part that is on them
-        when they are flat.
+        """Return the matrix (4, 4) by which actuators in these poses move a part mounted on them
+        when flat.
         """
         host = placed.part.on
         if host is None:
@@ -350,7 +350,7 @@ class _Scene:
         return [solid.transform(rows) for solid in _unmoved(placed, self.stacks, poses)]
 
     def _moving(self, name: str) -> dict[str, PlacedPart]:
-        """Return the parts fixed on a part, directly or not, by name."""
+        """Return the parts fixed to a part, directly or indirectly, by name."""
         names: dict[str, PlacedPart] = {}
         for part in self.assembled.parts:
             if part.part.on == name or part.part.on in names:
@@ -358,7 +358,7 @@ class _Scene:
         return names
 
     def touches(self, placed: PlacedSba) -> Iterator[Touch]:
-        """Yield the parts that an actuator meets when all are upright, each pair once."""
+        """Yield the parts in contact with an actuator when all are upright, each pair once."""
         # Parts on it move along; the part under it touches it as when flat.
         apart = {placed.name, placed.part.on, *self._moving(placed.name)}
         names = [part.name for part in self.assembled.parts]
@@ -373,10 +373,9 @@ class _Scene:
     def bends(
         self, placed: PlacedSba, pause: Callable[[], None]
     ) -> Iterator[AssemblyFigure | BentTouch]:
-        """Yield each bend at which an arm meets another part, then the least clearance to others.
+        """Yield each bend at which an arm touches another part, then the least clearance to others.
 
-        No clearance is given for the part under the arm and for parts farther away than
-        ``FARTHEST``.
+        The clearance excludes the part under the arm and parts farther away than ``FARTHEST``.
         """
         arm = self.stacks[placed.name]
         if arm.chambers < 2:
@@ -409,8 +408,9 @@ class _Scene:
     def _bent(
         self, placed: PlacedSba, chambers: Sequence[int], pressure: float
     ) -> tuple[Pose, Callable[[str], Solids]]:
-        """Return the pose of an arm bent by some chambers, and what of it, with all that is fixed
-        on it, may meet a part: not its lowest levels the part under it, on which they may rest.
+        """Return the pose of an arm bent by some chambers, and its solids, with all parts fixed to
+        it, that may touch a part. The lowest levels are omitted for the part under it, on which
+        they may rest.
         """
         arm = self.stacks[placed.name]
         pose = arm.pose(tuple(pressure if i in chambers else 0.0 for i in range(arm.chambers)))
@@ -430,7 +430,7 @@ class _Scene:
     def _first_contact(
         self, placed: PlacedSba, chambers: Sequence[int], part: str, pose: Pose
     ) -> Pose:
-        """Return approximately the first pose in contact with a part, at the latest this one."""
+        """Return the approximate first pose in contact with a part, at the latest this pose."""
         low, high = min(SLIGHTEST, self.pressure / 2), self.pressure
         for _ in range(HALVINGS):
             middle = math.sqrt(low * high)
@@ -451,13 +451,13 @@ def _stack_of(part: PartDesign) -> Stack:
 
 
 def _ways(chambers: int) -> list[tuple[int, ...]]:
-    """Return the sets of pressurised chambers: each alone, and each two side by side."""
+    """Return the sets of pressurised chambers: each one, and each adjacent pair."""
     alone: list[tuple[int, ...]] = [(i,) for i in range(chambers)]
     return alone + [(i, (i + 1) % chambers) for i in range(chambers) if chambers > 2]
 
 
 def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str, Pose]) -> Solids:
-    """Return a part on flat hosts: balloons and webs of a stack in its pose; of others the part
+    """Return a part on flat hosts: balloons and webs of a stack in its pose; for others the part
     with its pockets filled, or the free inflated cylinder of one around a tube.
     """
     part_design = placed.made
@@ -477,7 +477,7 @@ def _unmoved(placed: PlacedPart, stacks: Mapping[str, Stack], poses: Mapping[str
 
 
 def _shared_volume(first: Solids, second: Solids) -> float:
-    """Return the volume of their intersection, mm3."""
+    """Return the volume of the intersection, mm3."""
     return sum(float((a ^ b).volume()) for a in first for b in second if box_gap(a, b) <= 0)
 
 

@@ -1,4 +1,4 @@
-"""Raster pictures (Pillow): a depth buffer for surfaces, edges in it, words and a length bar."""
+"""Raster pictures (Pillow): a depth buffer for surfaces, edges in it, text and a scale bar."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class View(NamedTuple):
     centre: tuple[float, float]
 
     def flat(self, points: Floats) -> Floats:
-        """Points (n, 3) as pixels right and down, and mm toward the eye."""
+        """Return points (n, 3) as pixels right and down, and mm toward the eye."""
         right, up, toward = (points @ self.axes.T).T
         x = self.centre[0] + self.scale * right
         y = self.centre[1] - self.scale * up
@@ -72,7 +72,7 @@ class Buffer(NamedTuple):
 def view_of(
     surfaces: Sequence[Surface], elevation: float, azimuth: float, box: Sequence[float]
 ) -> View:
-    """The view from an elevation over the bench and an azimuth from x, degrees, filling a box.
+    """Return the view at an elevation and an azimuth from x, in degrees, that fills a box.
 
     The ``box`` is left, top, right, bottom in pixels.
     """
@@ -92,7 +92,7 @@ def view_of(
 
 
 def framed(width: float, height: float, margin: float, foot: float) -> tuple[float, ...]:
-    """The box for ``view_of`` of a picture with a margin and a foot, given as shares of it."""
+    """Return the box for ``view_of``, with a margin and a foot as fractions of the picture."""
     return margin * width, margin * height, (1 - margin) * width, (1 - margin - foot) * height
 
 
@@ -106,7 +106,7 @@ def rasterize(
 ) -> Buffer:
     """Return the depth buffer of the surfaces; ``lamp`` is the direction to the light, in the view.
 
-    Faces are lit one by one, or smoothly if ``normals`` (n, 3) of the points are given.
+    Faces are shaded flat, or smoothly if ``normals`` (n, 3) of the points are given.
     """
     shape = height, width
     buffer = Buffer(
@@ -134,14 +134,14 @@ def rasterize(
 
 
 def _lit(normals: Floats, lamp: Sequence[float]) -> Floats:
-    """Return the light of faces with normals (n, 3) in the view: from AMBIENT to 1."""
+    """Return the brightness of faces with normals (n, 3) in the view: from AMBIENT to 1."""
     light: Floats = AMBIENT + (1 - AMBIENT) * np.clip(normals @ np.array(lamp), 0, 1)
     return light
 
 
 def _paint(buffer: Buffer, body: int, front: Ints, corners: Floats, light: Floats) -> None:
-    """Paint triangles (n, 3, 3) of twice these areas at points that cover them, those of similar
-    size together; ``light`` (n, 3) is that of their corners, ``front`` their numbers.
+    """Paint triangles (n, 3, 3) of twice these areas, those of similar size together. ``light`` (n,
+    3) is the brightness of their corners, ``front`` their numbers.
     """
     sides = np.roll(corners, -1, axis=1)[:, :, :2] - corners[:, :, :2]
     lengths = np.hypot(sides[:, :, 0], sides[:, :, 1])
@@ -167,8 +167,8 @@ def _paint(buffer: Buffer, body: int, front: Ints, corners: Floats, light: Float
 
 
 def _nearest(buffer: Buffer, points: Floats) -> tuple[Ints, Ints]:
-    """Enter the depths of points (n, m, 3), and return the pixels in which one is now the nearest
-    to the eye, with its number.
+    """Update the depths with points (n, m, 3), and return the pixels for which a point is now
+    nearest to the eye, with its number.
     """
     x, y, depth = points.reshape(-1, 3).T
     height, width = buffer.body.shape
@@ -182,8 +182,8 @@ def _nearest(buffer: Buffer, points: Floats) -> tuple[Ints, Ints]:
 
 
 def edges(buffer: Buffer, step: float, borders: bool = False) -> NDArray[np.bool_]:
-    """Return the pixels beside a jump in depth by more than ``step`` mm; ``borders``: also those
-    beside another body.
+    """Return the pixels beside a step in depth of more than ``step`` mm; with ``borders`` also
+    those beside another body.
     """
     depth = np.where(buffer.body < 0, -1e9, buffer.depth)
     is_edge = np.zeros(depth.shape, dtype=bool)
@@ -216,9 +216,11 @@ def inscribe(
     legend: Sequence[tuple[RGB, str]] = (),
     pixels_per_mm: float = 0.0,
 ) -> None:
-    """Write a legend along the foot, lines over it, and over those a length bar at the right.
+    """Draw a legend along the foot, lines of text over it, and a scale bar at the right above
+    those.
 
-    ``size`` is the letters', pixels, in Pillow's own font; a bar is drawn if a scale is given.
+    ``size`` is the letter size, pixels, in Pillow's built-in font; the bar is drawn if a scale is
+    given.
     """
     from PIL import ImageDraw, ImageFont
 
@@ -252,7 +254,7 @@ def draw_length_bar(
     pixels_per_mm: float,
     font: FreeTypeFont | ImageFont,
 ) -> None:
-    """A bar that ends at ``right``, at most ``widest`` pixels long, with its length in mm above."""
+    """Draw a bar that ends at ``right``, at most ``widest`` pixels, with its length in mm above."""
     bar = max(step for step in BARS if step * pixels_per_mm <= widest or step == BARS[0])
     start = right - bar * pixels_per_mm
     words = f"{bar:g} mm"

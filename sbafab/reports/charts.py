@@ -1,7 +1,7 @@
 """Charts as SVG for screen and print, in mm.
 
-The colours are distinct for the colour blind (Okabe and Ito); dashes and markers distinguish lines
-in grey. The key is below the axes, where it covers nothing. Text stays text.
+The colours suit colour-blind readers (Okabe and Ito); dashes and markers distinguish lines in grey.
+The key is below the axes, where it covers nothing. Text is not converted to outlines.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class ChartCurve(NamedTuple):
 
 
 class ChartPoints(NamedTuple):
-    """Measured points, each with an error +- (0 draws no bar)."""
+    """Measured points, each with an error bar +- (0: none)."""
 
     label: str
     x: Sequence[float]
@@ -66,7 +66,7 @@ class ChartPoints(NamedTuple):
 
 
 class ChartSpecks(NamedTuple):
-    """Many values, each a small filled mark of SPECKS."""
+    """Many values, each a small filled marker."""
 
     label: str
     x: Sequence[float]
@@ -76,7 +76,7 @@ class ChartSpecks(NamedTuple):
 
 
 class ChartBars(NamedTuple):
-    """One bar per name of the panel, on top of the earlier ones: ``y`` are whole numbers."""
+    """One bar per name of the panel, stacked on earlier ones: ``y`` are integers."""
 
     label: str
     y: Sequence[int]
@@ -84,7 +84,7 @@ class ChartBars(NamedTuple):
 
 
 class Panel(NamedTuple):
-    """One pair of axes; labels carry their units. A key names curves if any has a label."""
+    """A pair of axes; labels include units. A key names the curves if any has a label."""
 
     title: str
     x_label: str
@@ -100,7 +100,7 @@ class Panel(NamedTuple):
 
 
 def chart_svg(title: str, panels: Sequence[Panel], in_row: int = 1000) -> str:
-    """Return the panels under one title, this many in a row."""
+    """Return the panels under one title, with this many in a row."""
     elements, width, height = [draw.text((3.0, 6.0), title, size=4.0, bold=True)], 0.0, 0.0
     for first in range(0, len(panels), in_row):
         end = below = 0.0
@@ -117,7 +117,7 @@ def chart_svg(title: str, panels: Sequence[Panel], in_row: int = 1000) -> str:
 def _panel(panel: Panel, place: int, begin: float) -> tuple[list[str], float, float]:
     """Return the elements of panel number ``place``, its right end and its height.
 
-    What belongs to a label is the group ``bars<place>.<number>``, ``curve...`` and so on.
+    The elements of a label form the group ``bars<place>.<number>``, ``curve...`` and so on.
     """
     plot = _plot(panel, begin)
     elements = list(_axes(plot, place))
@@ -136,19 +136,19 @@ def _panel(panel: Panel, place: int, begin: float) -> tuple[list[str], float, fl
 
 
 class _Scale(NamedTuple):
-    """An axis: the values at its ends, and its tick values with their texts."""
+    """An axis: the values at its ends, and its tick values with their labels."""
 
     low: float
     high: float
     ticks: Sequence[tuple[float, str]]
 
     def share(self, value: float) -> float:
-        """Return the place of a value, 0 at the low end and 1 at the high one."""
+        """Return the position of a value, 0 at the low end and 1 at the high end."""
         return (value - self.low) / (self.high - self.low)
 
 
 class _Plot(NamedTuple):
-    """A panel that begins at ``begin`` on the page and its axes at ``left``, and their scales."""
+    """The position ``begin`` of a panel on the page, ``left`` of its axes, and their scales."""
 
     panel: Panel
     begin: float
@@ -157,13 +157,13 @@ class _Plot(NamedTuple):
     y: _Scale
 
     def at(self, x: float, y: float) -> tuple[float, float]:
-        """Return the place of values on the page."""
+        """Return the position of values on the page."""
         wide, high = AXES
         return self.left + wide * self.x.share(x), HEAD + high * (1 - self.y.share(y))
 
 
 def _plot(panel: Panel, begin: float) -> _Plot:
-    """Return the plot of a panel; the wider the numbers, the further right its axes."""
+    """Return the plot of a panel; wider numbers move its axes to the right."""
     items: list[ChartCurve | ChartPoints | ChartSpecks]
     items = [*panel.curves, *panel.points, *panel.specks]
     bars = [pair for each in panel.points for pair in zip(each.y, each.error, strict=True)]
@@ -182,9 +182,9 @@ def _plot(panel: Panel, begin: float) -> _Plot:
 
 
 def _scale(values: Iterable[float], from_zero: bool, least: float = 0.0) -> _Scale:
-    """Return the axis of values, ignoring those that are not finite.
+    """Return the axis for values, ignoring non-finite ones.
 
-    Numbers stand ``least`` or more apart.
+    Tick values are at least ``least`` apart.
     """
     finite = [value for value in values if math.isfinite(value)] or [0.0, 1.0]
     low, high = min(finite), max(finite)
@@ -298,7 +298,7 @@ def _marker(shape: str, at: tuple[float, float]) -> str:
 
 
 def relation_svg(name: str, relation: Relation) -> str:
-    """Return the chart of a relation of the design called ``name``."""
+    """Return the chart of a relation for the design ``name``."""
     curves = [ChartCurve(line.label, line.x, line.y, line.model is None) for line in relation.lines]
     points = [ChartPoints(p.label, p.x, p.y, p.error) for p in relation.points]
     panel = Panel(relation.title, relation.x_label, relation.y_label, curves, points)

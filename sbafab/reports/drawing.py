@@ -34,7 +34,7 @@ HATCHES = "PTFE", "mask2", "mask3"  # patterns of the masks' inks
 
 
 def document(width: float, height: float, title: str, elements: Iterable[str]) -> str:
-    """A whole SVG file, ``width`` x ``height`` mm, on white."""
+    """Return a whole SVG file, ``width`` x ``height`` mm, on white."""
     w, h = coord(width), coord(height)
     drawn = "\n".join(elements)
     hatches = [
@@ -54,7 +54,7 @@ def document(width: float, height: float, title: str, elements: Iterable[str]) -
 
 
 def film_fill(film: Film) -> str:
-    """Return the fill of a film: masks are hatched, so that a grey print still shows them."""
+    """Return the fill of a film: masks are hatched, so that they differ in a grey print."""
     return f"url(#{HATCHES[film.shade % len(MASKS)]})" if film.is_mask else ink(film).fill
 
 
@@ -68,7 +68,7 @@ def text(
     colour: str = DARK,
     turned: bool = False,
 ) -> str:
-    """One line of text on its baseline; ``turned`` reads upward."""
+    """Return one line of text on its baseline; ``turned`` reads upward."""
     x, y = map(coord, at)
     extra = f' font-size="{coord(size)}"' if size != TEXT else ""
     extra += f' text-anchor="{anchor}"' if anchor != "start" else ""
@@ -79,7 +79,7 @@ def text(
 
 
 def text_width(words: str, size: float = TEXT) -> float:
-    """Upper estimate of a text's width in mm (digits of Helvetica are 0.556 em)."""
+    """Return an upper estimate of a text's width in mm (Helvetica digits are 0.556 em)."""
     narrow = sum(words.count(letter) for letter in " .,:;ijlt|-")
     return size * (0.58 * (len(words) - narrow) + 0.34 * narrow)
 
@@ -87,7 +87,7 @@ def text_width(words: str, size: float = TEXT) -> float:
 def style(
     stroke: str = "none", width: float = THIN, *, fill: str = "none", dashes: str = ""
 ) -> str:
-    """The attributes that fill and stroke a shape; holes stay open by the even-odd rule."""
+    """Return the attributes that fill and stroke a shape; holes stay open by the even-odd rule."""
     extra = ' fill-rule="evenodd"' if fill != "none" else ""
     extra += f' stroke-dasharray="{dashes}"' if dashes else ""
     return f'fill="{fill}" stroke="{stroke}" stroke-width="{coord(width)}"{extra}'
@@ -101,12 +101,12 @@ def seam_styles(width: float, thin: float = THIN, is_round: bool = True) -> tupl
 
 
 def fold_style() -> str:
-    """Return the attributes of a fold's line: dash and dot."""
+    """Return the attributes of a fold line: dash and dot."""
     return style(DARK, 0.35, dashes="2.6 0.7 0.5 0.7")
 
 
 def path(data: str, look: str) -> str:
-    """A path; ``look`` are its attributes."""
+    """Return a path; ``look`` are its attributes."""
     return f'<path d="{data}" {look}/>'
 
 
@@ -120,7 +120,7 @@ def circle(centre: Point, radius: float, look: str) -> str:
 
 
 def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: float = THIN) -> str:
-    """A rectangle between two corners."""
+    """Return a rectangle between two corners."""
     return (
         f'<rect x="{coord(low[0])}" y="{coord(low[1])}" width="{coord(high[0] - low[0])}" '
         f'height="{coord(high[1] - low[1])}" fill="{fill}" stroke="{stroke}" '
@@ -129,24 +129,24 @@ def box(low: Point, high: Point, *, fill: str, stroke: str = "none", width: floa
 
 
 def swatch(fill: str, stroke: str = GREY) -> str:
-    """The sign of a fill in a legend."""
+    """Return the sample of a fill in a legend."""
     return box((0.0, -2.6), (6.0, 0.6), fill=fill, stroke=stroke)
 
 
 def strokes(looks: Iterable[str]) -> str:
-    """The sign of lines in a legend, which lie on each other."""
+    """Return the sample of superimposed lines in a legend."""
     return "".join(path("M0 -1h6", look) for look in looks)
 
 
 def key(at: Point, sign: str, words: str) -> str:
-    """A row of a legend, whose baseline begins at a point: a sign drawn at (0, 0), and words."""
+    """A row of a legend, whose baseline starts at a point: a symbol drawn at (0, 0), and words."""
     x, y = at
     moved = f'<g transform="translate({coord(x)} {coord(y)})">{sign}</g>'
     return moved + text((x + KEY_SIGN, y), words)
 
 
 def arrow(tip: Point, toward: Point) -> str:
-    """A slender arrow head at ``tip`` that points along the unit vector ``toward``."""
+    """Return a slender arrow head at ``tip`` that points along the unit vector ``toward``."""
     (x, y), (u, v) = tip, toward
     bx, by = x - ARROW * u, y - ARROW * v
     half = ARROW * 0.18
@@ -156,7 +156,8 @@ def arrow(tip: Point, toward: Point) -> str:
 
 
 def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> list[str]:
-    """A dimension between two points, drawn ``distance`` from them along unit vector ``away``.
+    """Return a dimension between two points, drawn ``distance`` from them along unit vector
+    ``away``.
 
     ``away`` is perpendicular to the line from a to b, along x or y. If the arrows do not fit
     between the extension lines, they point inward from outside.
@@ -182,18 +183,18 @@ def dimension(a: Point, b: Point, words: str, away: Point, distance: float) -> l
 
 
 def leader(feature: Point, elbow: Point, label: Point, *, dot: bool = True) -> list[str]:
-    """A leader line from a feature by an elbow to a label; a dot or an arrow on the feature."""
+    """A leader from a feature by an elbow to a label; a dot or an arrow marks the feature."""
     end = circle(feature, 0.45, style(fill=DARK)) if dot else arrow(feature, _unit(elbow, feature))
     return [line([feature, elbow, label], colour=GREY), end]
 
 
 def across(a: Point, b: Point) -> list[str]:
-    """A width marked on the part itself, its label elsewhere; arrows outside if it is narrow."""
+    """A width marked on the part, with its label elsewhere; arrows are outside if it is narrow."""
     return _arrows(a, b, 6.0, 2.0)
 
 
 def _arrows(a: Point, b: Point, least: float, tail: float) -> list[str]:
-    """A line with arrows between two points; outside them, on tails, if they are nearer than
+    """Return a line with arrows between two points; outside them, on tails, if the gap is less than
     ``least`` arrows.
     """
     (u, v), is_near = _unit(a, b), math.dist(a, b) < least * ARROW
@@ -205,7 +206,7 @@ def _arrows(a: Point, b: Point, least: float, tail: float) -> list[str]:
 
 
 def spread(targets: Sequence[float], gap: float, low: float, high: float) -> list[float]:
-    """Positions as near as possible to the wanted ones (sorted), at least ``gap`` apart.
+    """Return positions as near as possible to the (sorted) desired ones, at least ``gap`` apart.
 
     They stay between ``low`` and ``high`` if all fit.
     """
@@ -241,10 +242,10 @@ MOST_RADII = 3
 
 @dataclass(frozen=True)
 class Circle:
-    """A circle or arc to point at, and the label for all of its kind.
+    """A circle or arc for a leader, and the label for all of its kind.
 
-    ``centre`` and ``radius`` are mm, like ``toward``, the point of an arc to point at; a
-    ``phantom`` is not an edge of the profile.
+    ``centre`` and ``radius`` are in mm, as is ``toward``, the target point on an arc; a ``phantom``
+    is not an edge of the profile.
     """
 
     words: str
@@ -256,7 +257,7 @@ class Circle:
 
 @dataclass(frozen=True)
 class WidthDimension:
-    """A width to draw across, from ``start`` to ``end`` in mm, and its label."""
+    """A width to draw across a part, from ``start`` to ``end`` in mm, and its label."""
 
     words: str
     start: Point
@@ -269,7 +270,7 @@ Dimension = Circle | WidthDimension
 def dimensions(laminate: Laminate, layer: Layer) -> list[Dimension]:
     """Return the dimensions on a layer's drawing: circles, radii and widths in mm, with labels.
 
-    Overall width and height stand beside them.
+    The overall width and height are drawn separately.
     """
     profile = layer.profile
     return [
@@ -290,14 +291,14 @@ def balloons(laminate: Laminate) -> str:
 
 
 def length(value: float) -> str:
-    """Millimetres as drawings give them: 6.50."""
+    """Return millimetres as in drawings: 6.50."""
     return f"{value:.2f}"
 
 
 def _circles(laminate: Laminate, layer: Layer) -> Iterator[Circle]:
-    """Yield the full circles of a profile, equal ones together, named by their meaning.
+    """Yield the full circles of a profile, equal ones together, named by function.
 
-    The outline of a single disc is left out: its overall width gives it.
+    The outline of a single disc is omitted, because its overall width defines it.
     """
     groups: dict[tuple[str, float], list[Point]] = {}
     for contour in layer.profile.contours:
@@ -311,7 +312,7 @@ def _circles(laminate: Laminate, layer: Layer) -> Iterator[Circle]:
 
 
 def is_disc(profile: Region, outer: Contour) -> bool:
-    """Return True if a contour is the round outline of a profile of one piece."""
+    """Return True if a contour is the round outline of a one-piece profile."""
     return outer.circle is not None and profile.outers == (outer,)
 
 
@@ -340,7 +341,7 @@ def _radii(profile: Region) -> Iterator[Circle]:
 
 
 def _circumscribed(profile: Region) -> Iterator[Circle]:
-    """Yield the circle about the axis that a lobed profile fits, inlet tabs and strips aside."""
+    """Yield the circle about the axis around a lobed profile, without inlet tabs and strips."""
     reaches = {
         _rounded(edge.centre): math.hypot(*edge.centre) + edge.radius
         for contour in profile.outers
@@ -353,7 +354,7 @@ def _circumscribed(profile: Region) -> Iterator[Circle]:
 
 
 def _inlet_width(laminate: Laminate, layer: Layer) -> Iterator[WidthDimension]:
-    """Yield the width of the inlet strip or tab, if any, at the inlet farthest right."""
+    """Yield the width of the rightmost inlet strip or tab, if any."""
     cuts = []
     for inlet in laminate.inlets if layer.role != "separator-mask" else ():
         # On the tab, clear of the fillets at its root.
@@ -381,7 +382,7 @@ def _piece_width(profile: Region) -> Iterator[WidthDimension]:
 
 
 def layer_numbers(indices: Sequence[int]) -> str:
-    """Layer numbers with even steps shortened: ``3, 7, 11 ... 59``; ``2 to 5`` for neighbours."""
+    """Return layer numbers with arithmetic sequences shortened: ``3, 7, 11 ... 59``; ``2 to 5``."""
     runs: list[list[int]] = []
     for index in indices:
         run = runs[-1] if runs else []

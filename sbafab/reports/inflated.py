@@ -1,8 +1,9 @@
-"""Inflated actuators as surfaces, from poses of the elastic stack or as lenses round a tube.
+"""Inflated actuators as surfaces, from poses of the elastic stack or as lenses around a tube.
 
-Each balloon is two films revolved around its chamber's axis on the plane midway between two plates,
-and sheared to the plates, which may be tilted; its meridian is the one between parallel plates at
-this distance (``models.balloon``). The bonded web around the pockets follows their edges inward.
+Each balloon consists of two films revolved around its chamber's axis on the plane midway between
+two plates, and sheared to the plates, which may be tilted; its meridian is the one between parallel
+plates at this distance (``models.balloon``). The bonded web around the pockets follows their edges
+inward.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ FLATTEST = 0.12  # least share of its height that a film keeps under tilted plat
 class InflatedPart(NamedTuple):
     """A closed surface of an inflated actuator: a chamber's balloons, or the bonded web.
 
-    ``chamber`` is its place in the laminate's, None for the web; ``normals`` (n, 3) are at the
+    ``chamber`` is its index in the laminate, None for the web; ``normals`` (n, 3) are at the
     points.
     """
 
@@ -58,10 +59,11 @@ class InflatedPart(NamedTuple):
 def inflated(
     laminate: Laminate, stack: Stack, pose: Pose, around: int = FINE
 ) -> list[InflatedPart]:
-    """The parts of a laminate in a pose, in mm on its base: the web first, then each chamber.
+    """Return the parts of a laminate in a pose, in mm on its base: first the web, then each
+    chamber.
 
-    Balloons have ``around`` facets around their axes, and half as many rings per film if that is
-    less. Raises DesignError if a balloon has no equilibrium.
+    Balloons have ``around`` facets around their axes, and at most half as many rings per film.
+    Raises DesignError if a balloon has no equilibrium.
     """
     levels = [_Level(pose, i) for i in range(len(stack.levels))]
     meridians = _meridians(stack, pose)
@@ -78,8 +80,9 @@ def inflated(
 
 
 class FilmMeridian(NamedTuple):
-    """One film from neck to rim: radii in mm and shares of the height to its plate; ``drawn`` is
-    the inward displacement of its pocket's edge, ``pocket`` the edge's original radius, both in mm.
+    """One film from neck to rim: radii in mm, and heights as fractions of the height to its plate.
+    ``drawn`` is the inward displacement of its pocket's edge, ``pocket`` the edge's original
+    radius, both in mm.
     """
 
     radii: Array
@@ -101,11 +104,11 @@ class _Level:
         self.axes = u @ v
 
     def points(self, x: Array, y: Array, z: Array) -> Array:
-        """Places in space of points in this frame."""
+        """Return points of this frame in space."""
         return np.asarray(self.origin + np.stack([x, y, z], axis=-1) @ self.axes.T)
 
     def heights(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Heights of the lower and the upper plate over points of the plane."""
+        """Return the heights of the lower and upper plate over points of the plane."""
         flat = self.points(x, y, np.zeros_like(x))
         up = self.axes[:, 2]
         below, above = (
@@ -116,7 +119,7 @@ class _Level:
 
 
 def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
-    """The films of each level and chamber; equal ones are computed once."""
+    """Return the films of each level and chamber; equal films are computed once."""
     gaps = np.maximum(np.rint(SAME * np.asarray(pose.gaps)), round(SAME * LEAST_GAP))
     p = np.rint(SAME * np.asarray(pose.pressures))
     keys = np.stack(np.broadcast_arrays(stack.levels[:, None], p, gaps), axis=-1)
@@ -135,7 +138,7 @@ def _meridians(stack: Stack, pose: Pose) -> list[list[FilmMeridian]]:
 
 
 def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Surface:
-    """Both films of a balloon and its necks, closed."""
+    """Return both films of a balloon and its necks, closed."""
     turn = np.arange(around) * (math.tau / around)
     rings = np.linspace(0, len(film.radii) - 1, min(len(film.radii), around // 2 + 1))
     ring_numbers = np.rint(rings).astype(int)
@@ -166,7 +169,7 @@ def _balloon(level: _Level, axis: Array, film: FilmMeridian, around: int) -> Sur
 def _webs(
     laminate: Laminate, stack: Stack, levels: Sequence[_Level], films: list[list[FilmMeridian]]
 ) -> Surface:
-    """Return the bonded web round the pockets of every level, as a plate of two films."""
+    """Return the bonded web around the pockets of every level, as a plate of two films."""
     by_region: dict[Region, Surface] = {}
     webs = []
     for i, (level, level_films) in enumerate(zip(levels, films, strict=True)):
@@ -187,7 +190,7 @@ def _webs(
 
 
 def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
-    """The plate of a level without its pockets and ears; inlet tabs are part of the lowest."""
+    """Return the plate of a level without its pockets and ears; the lowest includes inlet tabs."""
     plate = union([layer.profile for layer in laminate.tpe_layers[2 * i : 2 * i + 2]])
     if laminate.registration == "ears":
         tabs = [plate & tab for inlet in laminate.inlets for tab in _tab(plate, inlet)]
@@ -197,7 +200,8 @@ def _web(laminate: Laminate, stack: Stack, i: int) -> Region:
 
 
 def _tab(plate: Region, inlet: Inlet) -> Iterator[Region]:
-    """Yield the straight strip from the axis to an inlet's mouth, as wide as the plate is there.
+    """Yield the straight strip from the axis to an inlet's mouth, with the width of the plate
+    there.
 
     Only the films of the bottom balloon have tabs.
     """
@@ -215,7 +219,7 @@ def _joined(surfaces: Sequence[Surface]) -> Surface:
 
 
 def _normals(surface: Surface) -> Array:
-    """Unit normals (n, 3) of the points: means of their faces, by area."""
+    """Return the unit normals (n, 3) of the points: area-weighted means of their faces."""
     a, b, c = surface.points.take(surface.faces.T, axis=0)
     of_faces = np.cross(b - a, c - a)
     normals = np.zeros_like(surface.points)
@@ -226,14 +230,14 @@ def _normals(surface: Surface) -> Array:
 
 
 def pressed(stack: Stack, volumes_ul: Sequence[float]) -> Pose:
-    """The pose whose chambers hold these volumes in ul, found through their pressures.
+    """Return the pose at these chamber volumes in ul, found by solving for the pressures.
 
-    Raises DesignError for volumes that take suction or more than the stack's highest pressure.
+    Raises DesignError for volumes that need suction or more than the stack's highest pressure.
     """
     volumes = np.asarray(volumes_ul, dtype=float)
     if volumes.shape != (stack.chambers,) or not (np.isfinite(volumes) & (volumes >= 0)).all():
         raise DesignError(
-            f"volumes must be {stack.chambers} numbers of ul, 0 or more, one a chamber"
+            f"volumes must be {stack.chambers} numbers in ul, at least 0, one per chamber"
         )
     motion = stack.motion(line=Line(FLUIDS["water"]))
     remedy = "volumes that lie nearer together" if np.ptp(volumes) > 0 else ""
@@ -248,7 +252,7 @@ def pressed(stack: Stack, volumes_ul: Sequence[float]) -> Pose:
         needed, remedy = ", ".join(f"{p:.3g}" for p in pose.pressures), remedy or "more"
     target = ", ".join(f"{v:.4g}" for v in volumes)
     raise DesignError(
-        f"no pressures give the volumes {target} ul: they would take {needed} kPa; give {remedy}"
+        f"the volumes {target} ul are out of range: they need {needed} kPa; give {remedy}"
     )
 
 
@@ -259,11 +263,11 @@ ACROSS, ALONG = 13, 17
 
 
 def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
-    """Return balloons ``height`` mm high each on the tangents of their tube, in the part's own
-    frame; ``deflated`` is the diameter in mm over the flat films.
+    """Return balloons ``height`` mm high on the tangents of their tube, in the part's frame.
 
-    Across, a film is an arc that keeps its pocket's width (the lens of ``models.closed_forms``);
-    towards the pocket's round ends the lens shrinks with its chord.
+    ``deflated`` is the diameter in mm over the flat films. In cross-section a film is an arc that
+    keeps its pocket's width (the lens of ``models.closed_forms``); toward the pocket's round ends
+    the lens shrinks with its chord.
     """
     pockets = placed.made.design.form.pockets
     assert isinstance(pockets, Slots)
@@ -284,7 +288,7 @@ def gripping(placed: PlacedSba, deflated: float, height: float) -> Surface:
 
 
 def _lens(pockets: Slots, height: float) -> Surface:
-    """One balloon about its middle: x across, y along, z up; both films, their rims apart."""
+    """One balloon about its middle: x across, y along, z up; both films, with separate rims."""
     rise = np.array(height / pockets.width)
     half = float(inverse(lambda b: 2 * np.sin(b / 2) ** 2 / np.maximum(b, 1e-9), rise, math.pi / 2))
     bow = pockets.width / (2 * half)

@@ -1,4 +1,4 @@
-"""preview/layers.svg: every distinct pattern, dimensioned, with how many are needed."""
+"""preview/layers.svg: every distinct pattern, dimensioned, with the quantity needed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ LEAD = 5.0
 
 
 def layers_svg(laminate: Laminate) -> str:
-    """Every distinct pattern in plan at one scale, as a drawing for A3 (longer if need be)."""
+    """Return every distinct pattern in plan at one scale, as an A3 drawing (longer if needed)."""
     holding = pins_when_added(laminate)
     cards = [Card(laminate, layers, holding) for layers in laminate.patterns.values()]
     pinned = any(card.pins for card in cards)
@@ -63,8 +63,8 @@ def layers_svg(laminate: Laminate) -> str:
 
 
 def _grid(cards: Sequence[Card], block: float) -> tuple[float, int, Point, Point]:
-    """Return the largest scale at which all cards fit A3 (rather a longer page than tiny cards),
-    the columns, and the sizes of a cell and of the page.
+    """Return the largest scale at which all cards fit A3 (or a longer page), the columns, and the
+    sizes of a cell and of the page.
     """
     wide = PAGE[0] - 2 * MARGIN
     largest = max(max(card.size) for card in cards)
@@ -86,7 +86,7 @@ def _grid(cards: Sequence[Card], block: float) -> tuple[float, int, Point, Point
 
 
 def _keys(laminate: Laminate, pinned: bool) -> Iterator[tuple[str, str]]:
-    """Yield sign and words of the films, and of pins, seams and folds if there are any."""
+    """Yield symbol and name of the films, and of pins, seams and folds if there are any."""
     for film in dict.fromkeys(layer.film for layer in laminate.layers):
         distinct = film.product.startswith(film.material)
         name = film.product if distinct else f"{film.material}, {film.product}"
@@ -130,7 +130,7 @@ def _title_block(
 
 
 def _scale_bar(scale: float, end: Point) -> Iterator[str]:
-    """Yield a bar of a round length up to 60 mm on the page, ticked, and the units."""
+    """Yield a bar with a round length of at most 60 mm on the page, with ticks, and the units."""
     long = max(step for step in TICKS if step * scale <= 60.0)
     x1, y = end
     tick, x0 = long * scale / TICKS[long], x1 - long * scale
@@ -149,8 +149,8 @@ def _scale_bar(scale: float, end: Point) -> Iterator[str]:
 class Card:
     """One pattern with all content of its drawing; ``bounds`` includes phantom circles.
 
-    ``pins`` are the dowel pins that hold all its layers when they are laid (``holding``: those of
-    each layer); ``seams`` and ``folds`` join any of its layers to others.
+    ``pins`` are the dowel pins that hold all its layers during lay-up (``holding``: those of each
+    layer); ``seams`` and ``folds`` join any of its layers to others.
     """
 
     def __init__(
@@ -186,7 +186,7 @@ class Card:
         )
 
     def cell(self, scale: float) -> Point:
-        """Width and height in mm that the card takes on the page."""
+        """The width and height in mm of the card on the page."""
         width = LEFT + self.size[0] * scale + self.words_width + 2 * PAD
         caption = max(map(draw.text_width, self.caption)) + 9.0
         height = max(self.size[1] * scale, ROW * len(self.marks))
@@ -194,7 +194,7 @@ class Card:
 
 
 class CardFrame(NamedTuple):
-    """The place of profile coordinates on the page."""
+    """The position of profile coordinates on the page."""
 
     left: float
     top: float
@@ -237,7 +237,7 @@ def _heading(card: Card, corner: Point, cell: Point) -> Iterator[str]:
 
 
 def _outline(card: Card, frame: CardFrame) -> Iterator[str]:
-    """Yield the profile, phantom circles round it, centre marks of its holes, and pins."""
+    """Yield the profile, phantom circles around it, centre marks of its holes, and pins."""
     layer, scale = card.layers[0], frame.scale
     shape = layer.profile.mapped(frame.at, scale, mirror=True)
     look = draw.style(ink(layer.film).line, 0.25, fill=draw.film_fill(layer.film))
@@ -261,7 +261,7 @@ def _pin(centre: Point, radius: float) -> str:
 
 
 def _seam(seam: Seam, frame: CardFrame) -> Iterator[str]:
-    """Yield a seam as wide as it bonds, and the path of its tool."""
+    """Yield a seam at its bond width, and the path of its tool."""
     data = "".join(
         f"{chain_data(chain)}{'Z' if chain[0].start == chain[-1].end else ''}"
         for chain in seam.path
@@ -274,7 +274,7 @@ def _seam(seam: Seam, frame: CardFrame) -> Iterator[str]:
 
 
 def _fold(fold: Fold, layer: Layer, frame: CardFrame) -> Iterator[str]:
-    """Yield the line of a fold along the edges of a layer that end there, and past them."""
+    """Yield a fold line along the edges of a layer that end there, and past them."""
     for edge in layer.profile.edges:
         if lies_on(edge, [fold.line]):
             (x, y), (u, v) = frame.at(edge.start), frame.at(edge.end)
@@ -319,7 +319,7 @@ def _callouts(card: Card, frame: CardFrame, column: float, room: Point) -> Itera
 
 
 def _aim(mark: Dimension, frame: CardFrame) -> Point:
-    """Return the point on the page that a mark's label should be near."""
+    """Return the target point on the page for the label of a mark."""
     if isinstance(mark, WidthDimension):
         return min(frame.at(mark.start), frame.at(mark.end), key=lambda p: (-p[0], p[1]))
     if mark.phantom:

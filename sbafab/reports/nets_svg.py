@@ -31,7 +31,7 @@ RADIUS = 2.2
 class NetArea:
     """A void of an interface, counted from 1, with its net, "" if none, and the net's colour.
 
-    ``nets`` are all nets that it belongs to: several are a short.
+    ``nets`` are all its nets: more than one is a short.
     """
 
     net: str
@@ -100,7 +100,7 @@ def nets_svg(laminate: Laminate, connectivity: Connectivity) -> str:
 
 
 def _levels(laminate: Laminate, fault: NetFault) -> list[int]:
-    """The interfaces at which a fault is drawn: its own, or those beside its layer."""
+    """Return the interfaces at which a fault is drawn: its own, or those beside its layer."""
     if fault.interface is not None:
         return [fault.interface]
     gaps = laminate.interfaces

@@ -1,11 +1,14 @@
-"""Pages to print at 1:1: underlay.pdf to lay up on, below the release film; seams.pdf: the paths
-of seams on their films; tray.pdf: a place for every part in the order of laying.
+"""Pages to print at 1:1.
 
-The underlay shows the edges of every layer without pins at its place in the stack, seen from above,
-with the actuator's axis at the cross. If a cycle of many laminates does not fit one page, it is
-spread over several, with whole laminates on each: their dotted frames are cut out and laid edge to
-edge. On the tray plan, whose pages all cycles reuse, parts lie on their outlines, upper side up, so
-that a wrong or missing part is noticed. Ours; the effect on placement by hand was not measured.
+underlay.pdf lies below the release film for the lay-up; seams.pdf has the paths of seams on their
+films; tray.pdf has a place for every part in lay-up order.
+
+The underlay shows the edges of every layer without pins at its position in the stack, seen from
+above, with the actuator's axis at the cross. If a cycle of many laminates does not fit one page, it
+is spread over several, with whole laminates on each: their dotted frames are cut out and laid edge
+to edge. On the tray plan, whose pages serve all cycles, parts lie on their outlines, upper side up,
+so that a wrong or missing part is noticed. The paper has no such pages; their effect on hand
+placement was not measured.
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ FONT = "<< /Type /Font /Subtype /Type1 /BaseFont /%s /Encoding /WinAnsiEncoding 
 
 
 def pen(colour: tuple[float, float, float], width: float = 0.1, dashes: str = "") -> str:
-    """Return the operators that set colour (0 to 1), width and dashes (mm) of lines."""
+    """Return the operators for colour (0 to 1), width and dashes (mm) of lines."""
     return f"{' '.join(map(coord, colour))} RG {coord(width)} w [{dashes}] 0 d"
 
 
@@ -48,14 +51,14 @@ TRIM_LINE = pen((0.0, 0.0, 0.0), dashes="0.2 0.8")
 
 
 def edge_pen(is_mask: bool, width: float = 0.1) -> str:
-    """Return the pen of a mask's edges or a film's."""
+    """Return the pen for the edges of masks or films."""
     return pen((0.85, 0.4, 0.0), width, "1 0.6") if is_mask else pen((0.05, 0.25, 0.55), width)
 
 
 class PdfPage:
     """A page in mm, its lower left corner at (0, 0); later elements cover earlier ones.
 
-    The contents of the page ``under``, which several pages may share, lie below.
+    The contents of the page ``under``, which several pages may share, are drawn first.
     """
 
     def __init__(self, width: float, height: float, under: PdfPage | None = None) -> None:
@@ -80,13 +83,13 @@ class PdfPage:
         self._drawn += [look, *(f"{_at(start)} m {_at(end)} l S" for start, end in ends)]
 
     def centred(self, box: Bounds, foot: float) -> Point:
-        """Return the offset that centres a box between the head and a foot of a page to work on."""
+        """Return the offset that centres a box between the head and foot of a work page."""
         low_x, low_y, high_x, high_y = box
         x = self.width / 2 - (low_x + high_x) / 2
         return x, foot + (self.height - HEAD - foot - low_y - high_y) / 2
 
     def text(self, at: Point, words: str, size: float, bold: bool = False) -> None:
-        """Words that begin at a point, ``size`` mm."""
+        """Write text that starts at a point, ``size`` mm."""
         font = "F2" if bold else "F1"
         self._drawn.append(f"BT /{font} {coord(size)} Tf {_at(at)} Td {_string(words)} Tj ET")
 
@@ -97,7 +100,7 @@ class PdfPage:
 
 
 def pdf(pages: Sequence[PdfPage], title: str) -> bytes:
-    """The whole file, set to print at actual size."""
+    """Return the whole file, set to print at actual size."""
     streams = list(dict.fromkeys(stream for page in pages for stream in page.streams))
     numbers = {stream: f"{5 + len(pages) + n} 0 R" for n, stream in enumerate(streams)}
     kids = " ".join(f"{5 + n} 0 R" for n in range(len(pages)))
@@ -168,7 +171,7 @@ def _head(page: PdfPage, at: Point, title: str, lines: Iterable[str], size: floa
 
 
 def _bars(page: PdfPage, across: Point, up: Point) -> None:
-    """A bar along each direction of the page, from a point."""
+    """Draw a bar along each direction of the page, from a point."""
     (x0, y), (x, y0) = across, up
     ticks = [((x0 + end, y - 2), (x0 + end, y + 2)) for end in (0.0, BAR)]
     ticks += [((x - 2, y0 + end), (x + 2, y0 + end)) for end in (0.0, BAR)]
@@ -183,8 +186,8 @@ def _work_page(
     foot: float,
     sha256: str,
 ) -> PdfPage:
-    """Return a page to work on: title, use and bars above, the legend in the foot: words, each
-    after a line of its pen, or from the margin on without one.
+    """Return a work page: title, use and bars above, and the legend in the foot. Each legend entry
+    follows a line of its pen, or starts at the margin without one.
     """
     page = PdfPage(*size)
     _head(page, (LEFT, page.height - 16), title, use)
@@ -203,7 +206,7 @@ def _work_page(
 
 
 def _foot(rows: int) -> float:
-    """Room for a legend below the drawing, mm."""
+    """Return the height of the legend below the drawing, mm."""
     return 24 + ROW * rows
 
 
@@ -234,8 +237,8 @@ TRIM = (
 class Leaf:
     """One page: its size in mm, and its places of a cycle, counted from 1.
 
-    ``trim`` is the line to cut along, in the frame of the places. ``is_plate``: it is the base
-    plate's own edge, with its cut corner.
+    ``trim`` is the cutting line, in the frame of the places. ``is_plate``: it is the edge of the
+    base plate, with its cut corner.
     """
 
     size: tuple[float, float]
@@ -245,7 +248,7 @@ class Leaf:
 
 
 class Guide(NamedTuple):
-    """An outline to align to, the layers that have it, and the steps that lay them."""
+    """An outline for alignment, its layers, and the steps that lay them."""
 
     region: Region
     layers: list[Layer]
@@ -275,10 +278,10 @@ def underlay_pdf(
     places: Sequence[Point] = ((0.0, 0.0),),
     platen: tuple[float, float] = PLATEN,
 ) -> bytes | None:
-    """The pages; None for a laminate whose parts are all held by pins in every step.
+    """Return the pages; None for a laminate with pins for all parts in every step.
 
     They show the laminate at each of its ``places`` in the press, and the edge of the base plate,
-    as large as the ``platen`` (mm), as a line to cut along.
+    as large as the ``platen`` (mm), as a cutting line.
     """
     outlines = guides(laminate)
     spread = leaves(laminate, places, platen)
@@ -303,7 +306,7 @@ def leaves(
 ) -> list[Leaf]:
     """Return the places on each page, in whole rows and columns; empty without a guide.
 
-    A laminate larger than the paper gets a page that fits it. No page reaches past the base plate,
+    A laminate larger than the paper gets a page of its size. No page extends past the base plate,
     which is as large as the ``platen``.
     """
     outlines = guides(laminate)
@@ -333,8 +336,8 @@ def leaves(
 def _tiles(
     steps: Sequence[float], box: Bounds, plate: Bounds, room: float, axis: int
 ) -> Iterator[tuple[Sequence[float], float, float, float]]:
-    """Yield rows or columns per page, as even as possible, the length that they take, and the ends
-    of the paper, mm: midway to the next page; at an end beyond the cross, if the plate has room.
+    """Yield rows or columns per page, as even as possible, their length, and the ends of the paper,
+    mm. An end is midway to the next page; beyond the cross, if the plate has room, at an end.
     """
     low, high = box[axis], box[axis + 2]
     pitch = steps[1] - steps[0] if len(steps) > 1 else 0.0
@@ -357,8 +360,8 @@ def _draw_leaf(
     places: Sequence[Point],
     leaf: Leaf,
 ) -> None:
-    """Draw the laminates of a page, numbered if there are several, its trim frame in the middle:
-    the cross through the axis, the pins and the lines of each.
+    """Draw the laminates of a page, numbered if there are several, with the trim frame in the
+    middle. Each has the cross through the axis, the pins and the lines.
     """
     low_x, low_y, high_x, high_y = box_round([guide.region.bounds for guide in outlines])
     by = page.centred(leaf.trim.bounds, _foot_of(outlines))
@@ -376,7 +379,7 @@ def _draw_leaf(
 
 
 def guides(laminate: Laminate) -> list[Guide]:
-    """Return everything laid by hand in any step, equal outlines once, in order of steps."""
+    """Return all parts placed by hand in any step, equal outlines once, in order of steps."""
     shapes: dict[tuple[object, bool], Guide] = {}
     parts = press_steps(laminate)
     # A whole stack that is laid down again has no edge to align to.
@@ -391,7 +394,7 @@ def guides(laminate: Laminate) -> list[Guide]:
 
 
 def _loose(laminate: Laminate, step: LayUpStep, bed: Bed) -> Iterator[Layer]:
-    """Yield the layers with visible edges where a part without a pin lies in the step."""
+    """Yield the layers with visible edges of a part without a pin in the step."""
     layers = distinct_layers(laminate, bed.layers)
     loose = [layer for layer in layers if not {*step.pins} & {*laminate.pins_holding(layer)}]
     if bed.made_in is None:
@@ -416,7 +419,7 @@ def seams_pdf(
     laminate: Laminate, design_sha256: str, offsets: Mapping[str, Point] | None = None
 ) -> bytes | None:
     """Return pages of seam paths at 1:1, one for all seams of the same films; None without a seam.
-    Paths are at the seams, also for tools with ``offsets``, which a line of text says.
+    Paths are at the seams, even for tools with ``offsets``, which a line of text states.
     """
     steps: dict[tuple[int, ...], dict[int, Seam]] = {}
     for step in lay_up_steps(laminate):
@@ -486,7 +489,7 @@ TRAY_USE = (
 
 
 class TrayPart(NamedTuple):
-    """A part as it is cut, by its lowest layer."""
+    """A part as cut, represented by its lowest layer."""
 
     layer: Layer
     region: Region
@@ -497,13 +500,13 @@ class TrayPart(NamedTuple):
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width and height of its place, with its label, mm."""
+        """The width and height of its place, with its label, mm."""
         low_x, low_y, high_x, high_y = self.region.bounds
         return max(high_x - low_x, LETTER * LABEL * len(self.label)), high_y - low_y + BELOW
 
 
 def tray_pdf(laminate: Laminate, runs: Runs, design_sha256: str, batch: str | None = None) -> bytes:
-    """Return the pages of all places of a cycle."""
+    """Return the pages with all places of a cycle."""
     sheets = tray_sheets(laminate)
     pages = []
     for place in range(1, runs.together + 1):
@@ -558,9 +561,9 @@ def _draw_row(page: PdfPage, row: Sequence[TrayPart], foot: float) -> None:
 
 
 def _laid(laminate: Laminate) -> Iterator[tuple[str, list[TrayPart]]]:
-    """Yield the heading of each step that lays parts, and the parts in their order.
+    """Yield the heading of each step that lays parts, and the parts in order.
 
-    Folded halves are one part, with the half that is laid first.
+    Folded halves are one part, listed with the half that is laid first.
     """
     taken: set[int] = set()
     for step in lay_up_steps(laminate):
@@ -585,7 +588,7 @@ def _in_rows(parts: Sequence[TrayPart], width: float) -> Iterator[list[TrayPart]
 
 
 def _place_words(runs: Runs, place: int, batch: str | None) -> str:
-    """Return the laminates that use a page, as text; empty for a single one."""
+    """Return the laminates on a page, as text; empty for a single one."""
     names = [serial(runs, copy, batch) for copy in range(place, runs.copies + 1, runs.together)]
     if len(names) > MOST_NAMED:
         names = [names[0], "...", names[-1]]

@@ -1,8 +1,9 @@
 """Pictures of solids: the flat actuator cut open, an assembly, and inflated actuators.
 
-A laminate is a stack of prisms seen from above, so painting it from the bottom up gives correct
-occlusion; within one prism the walls go far to near, then its top face. Assemblies and inflated
-actuators are rasterized; these also move (GIF, WebP) or go to viewers (GLB).
+A laminate is a stack of prisms seen from above, so painting from the bottom up gives correct
+occlusion; within a prism the walls are painted from far to near, then its top face. Assemblies and
+inflated actuators are rasterized; they can also be animated (GIF, WebP) or exported for viewers
+(GLB).
 """
 
 from __future__ import annotations
@@ -66,7 +67,7 @@ SHADOW, BLUR, COARSE = 70, 8, 8
 
 
 class Prism(NamedTuple):
-    """A region from ``z`` up by ``thickness`` (true mm); its top is in shade where ``covered``."""
+    """A region from ``z`` up by ``thickness`` (true mm); its top is in shadow where ``covered``."""
 
     name: str
     region: Region
@@ -77,8 +78,8 @@ class Prism(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """A prism seen at z = 0, in pixels: the facets of its side that face the eye, each with its
-    colour, far to near; tops and their shaded places; outlines of tops.
+    """A prism seen at z = 0, in pixels: the visible facets of its side, each with its colour, far
+    to near; tops and their shadows; outlines of tops.
     """
 
     walls: list[tuple[Point, Point, RGB]]
@@ -88,8 +89,8 @@ class Shape(NamedTuple):
 
 
 def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> bytes:
-    """The TPE solid, cut open at one chamber, as PNG; with the height exaggerated as stated in its
-    caption.
+    """Return the TPE solid, cut open at one chamber, as PNG; the caption states the height
+    exaggeration.
     """
     from PIL import ImageDraw
 
@@ -127,7 +128,7 @@ def solid_png(laminate: Laminate, width: int = 1600, height: int = 1200) -> byte
 
 
 def _backdrop(footprint: Sequence[Sequence[Point]], size: tuple[int, int]) -> Image:
-    """White paper with the soft shadow of the footprint."""
+    """Draw white paper with the soft shadow of the footprint."""
     from PIL import Image, ImageDraw, ImageFilter
 
     small = Image.new("L", (size[0] // COARSE, size[1] // COARSE), PAPER[0])
@@ -142,7 +143,7 @@ def _backdrop(footprint: Sequence[Sequence[Point]], size: tuple[int, int]) -> Im
 
 
 def _prisms(laminate: Laminate) -> Iterator[Prism]:
-    """Films and the bonds in the gaps between them, bottom to top."""
+    """Return films and the bonds in the gaps between them, bottom to top."""
     above = {interface.below.index: interface for interface in laminate.interfaces}
     for layer in laminate.tpe_layers:
         interface = above.get(layer.index)
@@ -170,7 +171,7 @@ def _shape(prism: Prism, cut: RemovedSector, view: View) -> Shape:
 
 
 def _flat(view: View, points: Sequence[Point] | Floats) -> list[Point]:
-    """Points of the press plate in pixels."""
+    """Return points of the press plate in pixels."""
     pixels = view.flat(np.column_stack([points, np.zeros(len(points))]))
     return list(map(tuple, pixels[:, :2].tolist()))
 
@@ -178,7 +179,7 @@ def _flat(view: View, points: Sequence[Point] | Floats) -> list[Point]:
 def _walls(
     points: Floats, bond: bool, cut: RemovedSector, view: View
 ) -> Iterator[tuple[Point, Point, RGB]]:
-    """The facets that face the eye; material lies on the left of each, so right is outward."""
+    """Return the visible facets; material lies on the left of each, so the right is outward."""
     along = np.roll(points, -1, axis=0) - points
     normals = np.column_stack([along[:, 1], -along[:, 0]])
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -213,7 +214,7 @@ def _paint(prism: Prism, shape: Shape, rise: float, draw: Draw) -> None:
 
 
 def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
-    """One closed ring for a piece with holes: a slit joins each hole to the contour right of it."""
+    """One closed ring for a piece with holes: a slit joins each hole to its right contour."""
     merged = list(rings[0])
     for hole in sorted(rings[1:], key=lambda ring: -max(ring)[0]):
         first = max(range(len(hole)), key=lambda i: hole[i])
@@ -224,7 +225,7 @@ def keyhole(rings: Sequence[Sequence[Point]]) -> list[Point]:
 
 
 def _first_right_of(ring: Sequence[Point], x: float, y: float) -> tuple[int, Point]:
-    """Return first point at which a ray to the right meets the ring, and the vertex after it."""
+    """Return the first intersection of a ray to the right with the ring, and the next vertex."""
     meets = (
         (x1 - (x1 - x0) * (y1 - y) / (y1 - y0), i)
         for i, ((x0, y0), (x1, y1)) in enumerate(zip((ring[-1], *ring), ring, strict=False))
@@ -242,7 +243,7 @@ LEAST_SECTOR = math.radians(44.0)
 
 @dataclass(frozen=True)
 class RemovedSector:
-    """A sector with its tip at ``apex``, counter-clockwise from angle ``first`` to ``last``."""
+    """A sector with its apex at ``apex``, counter-clockwise from angle ``first`` to ``last``."""
 
     chamber: str
     apex: Point
@@ -251,16 +252,17 @@ class RemovedSector:
     removed: Region
 
     def on_faces(self, points: Floats) -> NDArray[np.bool_]:
-        """Return for each of the two faces of the cut which points (n, 2) lie on it."""
+        """Return, for each of the two faces of the cut, which points (n, 2) lie on it."""
         rays = np.array([[math.sin(a), -math.cos(a)] for a in (self.first, self.last)])
         return np.asarray(np.abs(rays @ (points - self.apex).T) < 1e-5)
 
 
 def cutaway(laminate: Laminate) -> RemovedSector:
-    """The sector beside one chamber: a face runs through its middle and along its inlet.
+    """Return the sector beside one chamber: one face runs through its middle and along its inlet.
 
-    Round a lumen the tip is on the actuator's axis and the other face runs between two lobes;
-    else the tip is the chamber's middle and the sector a quarter. Without chambers it is a port.
+    With a lumen the apex is on the actuator's axis and the other face runs between two lobes;
+    otherwise the apex is the chamber's middle and the sector a quarter. Without chambers a port is
+    used.
     """
     inlet = next(iter(laminate.inlets), None)
     u, v = inlet.direction if inlet else (1.0, 0.0)
@@ -296,10 +298,10 @@ STEP_MM = 0.25  # jump in depth that is drawn as an edge
 def assembly_pngs(
     assembled: Assembled, note: str = "", width: int = 1040, height: int = 780
 ) -> tuple[bytes, bytes]:
-    """Return the assembly before inflation, seen from the front above, as PNG, and a picture
-    without caption and legend for pages with their own; ``note`` ends the caption.
+    """Return the assembly before inflation as PNG, seen from the front above, and a picture without
+    caption and legend.
 
-    Inlet tubes and what the films enclose are not shown.
+    ``note`` ends the caption. Inlet tubes and enclosed spaces are not shown.
     """
     from PIL import ImageDraw, ImageFont
 
@@ -327,7 +329,7 @@ def assembly_pngs(
 
 
 def _legend(assembled: Assembled, paints: Mapping[str, RGB]) -> list[tuple[RGB, str]]:
-    """One line per colour: the parts that have it, and what they are."""
+    """Draw one line per colour: the parts with it, and their kinds."""
     lines: dict[tuple[RGB, str], list[str]] = {}
     for placed in assembled.parts:
         kind = placed.part.kind if placed.made is None else placed.made.design.name
@@ -361,10 +363,10 @@ GROUND = -0.06
 class PictureRequest:
     """The request for a picture.
 
-    ``pressures_kpa`` or ``volumes_ul`` of the chambers by name, 0 by default; the name "" means
-    all. ``elevation`` and ``azimuth`` of the eye are in degrees, ``width`` and ``height`` in
-    pixels. An animation goes from flat to this pose and back (``inflate``), or moves the pressure
-    around the chambers (``circle``).
+    ``pressures_kpa`` or ``volumes_ul`` hold values by chamber name, 0 by default; "" means all.
+    ``elevation`` and ``azimuth`` of the eye are in degrees, ``width`` and ``height`` in pixels. An
+    animation goes from flat to this pose and back (``inflate``), or moves the pressure around the
+    chambers (``circle``).
     """
 
     pressures_kpa: Mapping[str, float]
@@ -378,7 +380,7 @@ class PictureRequest:
 
 
 def pose_of(laminate: Laminate, stack: Stack, request: PictureRequest) -> Pose:
-    """The pose of a request. Raises DesignError for an unknown chamber."""
+    """Return the pose of a request. Raises DesignError for an unknown chamber."""
     if request.volumes_ul is not None:
         volumes = _by_chamber(laminate, request.volumes_ul)
         empty = [c.name for c in laminate.chambers if not {"", c.name} & set(request.volumes_ul)]
@@ -389,7 +391,7 @@ def pose_of(laminate: Laminate, stack: Stack, request: PictureRequest) -> Pose:
                 raise
             shown = " and ".join(empty)
             raise DesignError(
-                f"{error}; a chamber not named counts as empty: name {shown}"
+                f"{error}; an unnamed chamber counts as empty: name {shown}"
             ) from None
     return stack.pose(_by_chamber(laminate, request.pressures_kpa))
 
@@ -398,7 +400,9 @@ def _by_chamber(laminate: Laminate, values: Mapping[str, float]) -> tuple[float,
     names = [chamber.name for chamber in laminate.chambers]
     unknown = [name for name in values if name and name not in names]
     if unknown:
-        raise DesignError(f"chamber {unknown[0]} is not there; the chambers are {', '.join(names)}")
+        raise DesignError(
+            f"chamber {unknown[0]} does not exist; the chambers are {', '.join(names)}"
+        )
     return tuple(float(values.get(name, values.get("", 0.0))) for name in names)
 
 
@@ -409,7 +413,7 @@ def write_picture(
     path: Path,
     progress: Callable[[int, int], None] | None = None,
 ) -> Pose:
-    """Writes ``path`` in the format of its suffix, and returns the pose shown.
+    """Write ``path`` in the format of its suffix, and return the pose shown.
 
     Raises DesignError for a suffix not in ENDINGS and for impossible poses.
     """
@@ -438,7 +442,7 @@ def _refuse_ending(path: Path) -> None:
 def pictures_at_one_scale(
     shown: Sequence[tuple[Laminate, Stack, Pose]], request: PictureRequest
 ) -> list[bytes]:
-    """Return a picture of each actuator with a caption as PNG, all seen from one place."""
+    """Return a picture of each actuator with a caption as PNG, all from one viewpoint."""
     every = [inflated(laminate, stack, pose) for laminate, stack, pose in shown]
     if not every:
         return []
@@ -457,7 +461,7 @@ def _animation(
     ending: str,
     progress: Callable[[int, int], None] | None,
 ) -> bytes:
-    """Poses one after the other, in an endless loop, as GIF or WebP."""
+    """Write poses in sequence as an endless loop, as GIF or WebP."""
     from PIL import Image
 
     every = [inflated(laminate, stack, pose, COARSE_FACETS) for pose in poses]
@@ -487,12 +491,14 @@ def _animation(
 
 
 def _poses(stack: Stack, last: Pose, request: PictureRequest) -> list[Pose]:
-    """Poses of an animation, which ends where it began."""
+    """Return the poses of an animation, which ends where it began."""
     turns = [number / request.frames * math.tau for number in range(request.frames)]
     steps = [[p * ((1 - math.cos(turn)) / 2) ** 1.5 for p in last.pressures] for turn in turns]
     if request.motion == "circle":
         if stack.chambers < 3:
-            raise DesignError("pressure goes round three chambers or more; use motion inflate")
+            raise DesignError(
+                "pressure can circle around three or more chambers only; use motion inflate"
+            )
         most = max(last.pressures)
         at = [math.atan2(float(y), float(x)) for x, y in stack.axes]
         # Full at a chamber's own angle, none from 120 degrees on.
@@ -507,7 +513,7 @@ def _poses(stack: Stack, last: Pose, request: PictureRequest) -> list[Pose]:
 
 
 def _view(surfaces: Sequence[Surface], request: PictureRequest) -> View:
-    """The view of a picture before it is reduced."""
+    """Return the view of a picture before its reduction."""
     box = framed(ENLARGED * request.width, ENLARGED * request.height, *FRAME)
     return view_of(surfaces, request.elevation, request.azimuth, box)
 
@@ -520,8 +526,8 @@ def _image(
     caption: Sequence[str],
     most: float | None = None,
 ) -> Image:
-    """One pose in colours up to the pressure ``most``, by default its highest, with a caption, on a
-    white background with its shadow on the ground.
+    """Return one pose in colours up to the pressure ``most``, by default its highest, with a
+    caption. The background is white, with a shadow on the ground.
     """
     most = max(pose.pressures) if most is None else most
     size = request.width * ENLARGED, request.height * ENLARGED
@@ -544,7 +550,7 @@ def _image(
 
 
 def _colour(part: InflatedPart, pose: Pose, most: float) -> RGB:
-    """The web's colour, or a chamber's by its share of the highest pressure."""
+    """Return the web's colour, or a chamber's according to its fraction of the highest pressure."""
     if part.chamber is None:
         return WEB
     share = pose.pressures[part.chamber] / most if most > 0 else 0.0
@@ -560,7 +566,7 @@ def _model(laminate: Laminate, calibration: str) -> str:
 
 
 def _has_drawn_pockets(laminate: Laminate) -> bool:
-    """Return True if masks lie in the pockets and none is round about the middle of its pocket."""
+    """Return True if pockets have masks and none is round about its pocket's middle."""
     masks = [layers[0] for layers in laminate.patterns.values() if layers[0].role == "chamber-mask"]
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
     edges = [edge for mask in masks for outer in mask.profile.outers for edge in outer.edges]
@@ -570,7 +576,7 @@ def _has_drawn_pockets(laminate: Laminate) -> bool:
 
 
 def _caption(laminate: Laminate, pose: Pose, calibration: str) -> list[str]:
-    """Return the caption, below the paper's measured bend or height beside the model's."""
+    """Return the caption, with the paper's measured bend or height beside the model's."""
     pressures = ", ".join(f"{p:.3g}" for p in pose.pressures)
     figure = "bend" if pose.bend > 0.5 else "height"
     bent = f", bent {pose.bend:.0f} degrees" if figure == "bend" else f", {pose.height:.1f} mm high"
@@ -587,16 +593,15 @@ WHY = "no model inflates pockets that are not nearly round, or stand round a tub
 
 
 def write_flat_picture(laminate: Laminate, path: Path, width: int, height: int) -> None:
-    """Writes ``path`` in the format of its suffix: the solid before inflation, so labelled in a
-    PNG.
+    """Write ``path`` in the format of its suffix: the solid before inflation, so labelled in a PNG.
 
     Raises DesignError for the suffix of an animation, and for one not in ENDINGS.
     """
     ending = path.suffix.lower()
     if ending in MOVING:
         raise DesignError(
-            f"{path.name} would show {laminate.name} move, but {WHY}: a .png or .glb shows it "
-            "flat, and sbafab simulate inflates it"
+            f"{path.name} would animate {laminate.name}, but {WHY}: write a .png or .glb of the "
+            "flat solid, or inflate it with sbafab simulate"
         )
     _refuse_ending(path)
     if ending == ".png":
@@ -618,7 +623,7 @@ DARKEST, SOFT_MM = 0.34, 0.9  # of the shadow on the ground: a share, and its so
 
 
 def _crevices(buffer: Buffer, scale: float) -> Floats:
-    """Darkening of pixels that lie behind their surroundings, as a share."""
+    """Return the darkening of pixels behind their surroundings, as a fraction."""
     far = float(buffer.depth[buffer.body >= 0].min()) if (buffer.body >= 0).any() else 0.0
     depth = np.where(buffer.body < 0, far, buffer.depth)
     dark = np.zeros_like(depth)
@@ -629,7 +634,7 @@ def _crevices(buffer: Buffer, scale: float) -> Floats:
 
 
 def _blurred(values: Floats, pixels: float) -> Floats:
-    """Box means over squares about this many pixels wide, twice, for a soft edge."""
+    """Return box means over squares about this many pixels wide, twice, for a soft edge."""
     half = max(1, round(pixels / 2))
     width = 2 * half + 1
     for _ in range(4):
@@ -640,7 +645,7 @@ def _blurred(values: Floats, pixels: float) -> Floats:
 
 
 def _shadow(surfaces: Sequence[Surface], view: View, size: tuple[int, int]) -> Floats:
-    """Return the share of the light above that does not reach the ground, by pixel: 0 to 1."""
+    """Return the fraction of overhead light that does not reach the ground, by pixel."""
     points = np.concatenate([surface.points for surface in surfaces])
     # Light comes from above, a little from the left of the picture, wherever the eye is.
     slant = 0.25 * view.axes[0] * np.array([1.0, 1.0, 0.0])

@@ -34,7 +34,7 @@ Shown = TypeVar("Shown", Layer, Interface)
 
 
 class SectionPlane(NamedTuple):
-    """The plane of the section: a point on it and a unit vector along it."""
+    """The plane of the section: a point in it and a unit vector along it."""
 
     origin: Point
     direction: Point
@@ -48,8 +48,8 @@ class SectionPlane(NamedTuple):
 
 
 class Band(NamedTuple, Generic[Shown]):
-    """A layer cut by the plane with the spans that have film, or an interface with the spans where
-    its films are bonded, and its heights on the page.
+    """A layer in the section with the spans of its film, or an interface with its bonded spans, and
+    its heights on the page.
     """
 
     of: Shown
@@ -65,7 +65,7 @@ class Band(NamedTuple, Generic[Shown]):
 class Rod(NamedTuple):
     """A pin in the plane of the section, from ``span`` start to end.
 
-    It holds the layers ``stacks``, the lowest and highest index of each stack pressed by itself,
+    It holds the layers ``stacks``, the lowest and highest index of each separately pressed stack,
     and is in place at the press steps ``steps``.
     """
 
@@ -80,12 +80,12 @@ class Rod(NamedTuple):
 
 
 class StackSection:
-    """The cut, in mm along the plane from the chamber's axis, positive toward its inlet, and its
-    place on the page: ``across`` and ``up`` are page mm per mm of it.
+    """The section, in mm along the plane from the chamber's axis, positive toward its inlet, and
+    its position on the page: ``across`` and ``up`` are page mm per mm.
 
     The plane runs through the first chamber's axis and its inlet; without a chamber along x through
-    the first port. ``hidden`` balloons are left out above the layer ``break_above`` (an index; 0
-    for none). ``lumen`` is the position of the actuator's axis along the plane, if it has a lumen.
+    the first port. ``hidden`` balloons are omitted above the layer ``break_above`` (an index; 0 for
+    none). ``lumen`` is the position of the actuator's axis along the plane, if it has a lumen.
     ``cropped``: the section beyond ``low`` is not shown. ``tab`` runs from the outline to its
     mouth.
     """
@@ -144,8 +144,8 @@ class StackSection:
                 yield Band(gap, spans, bottom + half, top - half)
 
     def _fold_ends(self, plane: SectionPlane) -> Iterator[tuple[Fold, float, bool]]:
-        """Yield the folds cut by the plane, if the films shown end at them: where, and whether the
-        film is on the far side.
+        """Yield the folds in the plane at which shown films end: the position, and whether the film
+        is on the far side.
         """
         (a, b), (dx, dy) = plane
         for fold in self.laminate.folds:
@@ -188,7 +188,7 @@ def _plane(laminate: Laminate) -> tuple[str, SectionPlane]:
 
 
 def _shown(laminate: Laminate) -> tuple[Sequence[Layer], int, int]:
-    """Return the layers to show, the number of balloons left out, and the layer below those."""
+    """Return the layers to show, the number of omitted balloons, and the layer below those."""
     count = laminate.balloons
     if count <= MOST_BALLOONS:
         return laminate.layers, 0, 0
@@ -232,7 +232,7 @@ def _stands(laminate: Laminate, pin: Pin) -> Sequence[tuple[int, int]]:
 
 
 def opening(spans: Spans, at: float) -> Interval | None:
-    """The opening between two spans that holds ``at``; None if ``at`` is covered or outside."""
+    """Return the opening between two spans around ``at``; None if ``at`` is covered or outside."""
     before = [end for _, end in spans if end <= at]
     after = [start for start, _ in spans if start >= at]
     if not before or not after or any(start < at < end for start, end in spans):
@@ -244,7 +244,7 @@ def opening(spans: Spans, at: float) -> Interval | None:
 
 
 def stack_svg(laminate: Laminate) -> str:
-    """The section through the first chamber in the plane of its inlet, labelled, on A4."""
+    """Return the section through the first chamber in the plane of its inlet, labelled, on A4."""
     cut = StackSection(laminate)
     page = cut.height + HEAD + FOOT
     elements = list(_heading(cut))
@@ -283,7 +283,7 @@ def _bonds(cut: StackSection, with_masks: bool) -> Iterator[str]:
 
 
 def _fold(fold: Fold, s: float, is_ahead: bool, cut: StackSection) -> Iterator[str]:
-    """Yield the film that continues from one half to the other, and the line of the fold."""
+    """Yield the film that continues from one half to the other, and the fold line."""
     lower, upper, turn = cut.by_index[fold.lower], cut.by_index[fold.upper], int(not is_ahead)
     film, thick, outer = lower.of.film, lower.bottom - lower.top, (lower.bottom - upper.top) / 2
     x, low, high = map(coord, (cut.x(s), lower.bottom, upper.top))
@@ -335,8 +335,8 @@ def _wave(start: Point, end: Point) -> str:
 
 
 def _dimensions(cut: StackSection) -> Iterator[str]:
-    """Yield the whole width over the top balloon, and under the stack the tab, and how far the
-    inlet strip reaches past its mouth.
+    """Yield the overall width over the top balloon, and below the stack the tab and the extension
+    of the inlet strip past its mouth.
     """
     cap, base = cut.slabs[-1], cut.slabs[0]
     whole = cap.spans[0][0], cap.spans[-1][1]
@@ -392,7 +392,7 @@ SideLabel = tuple[float, float, str, str]
 
 
 def _labels(cut: StackSection) -> Iterator[str]:
-    """Yield layer names at the right, features at the left, each with a leader."""
+    """Yield layer names at the right and features at the left, each with a leader."""
     low, high = HEAD - 4.0, HEAD + cut.height + 6.0
     mouth = cut.tab[1] if cut.tab else cut.high
     pins: tuple[list[SideLabel], list[SideLabel]] = ([], [])
@@ -415,7 +415,7 @@ def _labels(cut: StackSection) -> Iterator[str]:
 
 
 def _layer_labels(cut: StackSection) -> Iterator[SideLabel]:
-    """Yield number and role of every layer shown, pointing near its end at the inlet's side."""
+    """Yield number and role of every layer shown, with a leader to its end on the inlet's side."""
     base_end = max(slab.spans[-1][1] for slab in cut.slabs if not slab.of.is_mask)
     for slab in cut.slabs:
         if slab.spans:
@@ -428,7 +428,7 @@ def _layer_labels(cut: StackSection) -> Iterator[SideLabel]:
 
 
 def _feature_labels(cut: StackSection) -> Iterator[SideLabel]:
-    """Yield the first of each: bond, pocket, neck ring, overhang, bore and lumen."""
+    """Yield the first of each feature: bond, pocket, neck ring, overhang, bore and lumen."""
     films = [slab for slab in cut.slabs if not slab.of.is_mask]
     bore = "bore ⌀" if cut.laminate.bores else "opening "
     for labels in (
@@ -465,7 +465,7 @@ def _pocket(cut: StackSection) -> Iterator[Feature]:
 
 
 def _neck_ring(cut: StackSection) -> Iterator[Feature]:
-    """Yield bonds beside the bore that carry one balloon on the next, or a sheet's windows."""
+    """Yield bonds beside the bore that join one balloon to the next, or a sheet's windows."""
     for joint in cut.bonds("separator"):
         windows = [span for span in joint.spans if span[0] < 0 < span[1]]
         rings = [span for span in joint.spans if span[1] <= 0][-1:]
@@ -474,7 +474,7 @@ def _neck_ring(cut: StackSection) -> Iterator[Feature]:
 
 
 def _overhang(cut: StackSection) -> Iterator[Feature]:
-    """Yield separator masks past the wall above them, away from the inlet if that shows."""
+    """Yield separator masks past the wall above them, opposite the inlet if visible there."""
     for mask, wall in pairwise(cut.slabs):
         if mask.of.role == "separator-mask" and mask.spans and wall.spans:
             span = mask.spans[0][0], wall.spans[0][0]

@@ -1,5 +1,5 @@
 """Design rules: one module a rule.
 
-In: a ``Laminate`` and the limits of its design, as ``Measures``. Out: findings, each a verdict with
-its value, limit, place and the id of a sentence in ``sentences.toml``.
+Input: a ``Laminate`` and the limits of its design, as ``Measures``. Output: findings, each a
+verdict with its value, limit, place and the id of a sentence in ``sentences.toml``.
 """

@@ -1,4 +1,4 @@
-"""bond-width: every bond is wide enough everywhere (paper Sec. 2: narrower ones leak)."""
+"""bond-width: every bond is wide enough everywhere (paper Sec. 2: narrower bonds leak)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,7 @@
-"""Edges of regions beside each other: shared stretches, reach to the next edge, films that face.
+"""Adjacent edges of regions: shared stretches, distance to the next edge, and films that face each
+other.
 
-Includes every pair of films that face each other past films that end between them.
+This includes pairs of films that face each other beyond films that end between them.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ NEARER: Final = 1e-9
 
 @cached
 def edges_along(region: Region, boundary: Region) -> tuple[Edge, ...]:
-    """The stretches of ``region``'s edges that run along ``boundary``'s edges, the same way."""
+    """Return the stretches of ``region``'s edges on ``boundary``'s edges, in the same direction."""
     along = []
     contours, boundary_contours = (
         ((c, 1) for c in region.contours),
@@ -50,20 +51,20 @@ def edges_along(region: Region, boundary: Region) -> tuple[Edge, ...]:
 
 
 def beside(edge: Edge, distance: float) -> Point:
-    """The point ``distance`` to the left of the edge's middle (to the right if negative)."""
+    """Return the point ``distance`` to the left of the edge's midpoint (right if negative)."""
     middle = edge.at(0.5)
     nx, ny = left_normal(edge, middle)
     return middle[0] + nx * distance, middle[1] + ny * distance
 
 
 def middle(region: Region) -> Point:
-    """Return the middle of the box round a region."""
+    """Return the centre of the bounding box of a region."""
     low_x, low_y, high_x, high_y = region.bounds
     return (low_x + high_x) / 2, (low_y + high_y) / 2
 
 
 class Reach(NamedTuple):
-    """Distance along an edge's right-hand normal to the first other edge, and the place there."""
+    """Distance along an edge's right-hand normal to the nearest other edge, and the point there."""
 
     value: float
     at: Point
@@ -72,7 +73,7 @@ class Reach(NamedTuple):
 def outward_reach(edge: Edge, targets: EdgeIndex) -> Reach | None:
     """Return the least distance from ``edge``, along its right-hand normal, to any of ``targets``.
 
-    Measured in the band that the edge sweeps along its normals; None if nothing lies in it.
+    The search covers the band that the edge sweeps along its normals; None if the band is empty.
     """
     if edge.length < END_ROOM:
         return None
@@ -89,9 +90,9 @@ def outward_reach(edge: Edge, targets: EdgeIndex) -> Reach | None:
 
 
 def _swept(edge: Edge, moved: Edge | None) -> Bounds:
-    """A box round the area that the edge sweeps when it moves along its right-hand normal.
+    """Return a box around the area that the edge sweeps along its right-hand normal.
 
-    An arc that shrinks to a point on its way sweeps the area between it and its centre.
+    An arc that shrinks to a point sweeps the area between it and its centre.
     """
     box = edge.bounds
     if moved is None:
@@ -104,7 +105,7 @@ def _swept(edge: Edge, moved: Edge | None) -> Bounds:
 
 
 def _across(edge: Edge, moved: Edge | None, targets: Iterable[Edge]) -> Iterable[Edge]:
-    """Targets that may lie in the band beside an edge; all if it turns far."""
+    """Return the targets that may lie in the band beside an edge; all targets for a large arc."""
     if moved is None or (isinstance(edge, Arc) and abs(edge.sweep) > 1.0):
         return targets
     ux, uy = edge.direction(edge.at(0.5))
@@ -155,12 +156,12 @@ class _Band(NamedTuple):
         return _Band(edge, tuple((edge.centre, ((x - cx) / r, (y - cy) / r)) for x, y in ends))
 
     def holds(self, p: Point) -> bool:
-        """Return True if ``p`` lies in the band or behind the edge, and not beside it."""
+        """Return True if ``p`` lies in the band or behind the edge, but not to one side."""
         room = 0.5 * END_ROOM / self.edge.length
         return room <= self.edge.parameter(p) <= 1 - room
 
     def height(self, p: Point) -> float:
-        """Distance of ``p`` from the edge along the normal."""
+        """Return the distance of ``p`` from the edge along the normal."""
         edge = self.edge
         if isinstance(edge, Arc):
             outward = math.dist(p, edge.centre) - edge.radius
@@ -169,14 +170,14 @@ class _Band(NamedTuple):
         return -((p[0] - edge.start[0]) * nx + (p[1] - edge.start[1]) * ny)
 
     def is_passed_by(self, target: Edge, p: Point) -> bool:
-        """True if ``target`` runs along the band's side at ``p``, and not across the band."""
+        """Return True if ``target`` runs along the band's side at ``p`` without crossing it."""
         along = self.edge.parameter(p) * self.edge.length
         at_side = min(along, self.edge.length - along) < LEANING
         (ux, uy), (nx, ny) = target.direction(p), left_normal(self.edge, p)
         return at_side and abs(ux * ny - uy * nx) < STEEP
 
     def nearest_candidates(self, target: Edge) -> Iterator[Point]:
-        """Candidate points of ``other``; the nearest point within the band is among them."""
+        """Return candidate points of ``other``, among them the nearest point within the band."""
         yield target.start
         yield target.end
         yield from _extremes(self.edge, target)
@@ -185,7 +186,7 @@ class _Band(NamedTuple):
 
 
 def _extremes(edge: Edge, target: Edge) -> Sequence[Point]:
-    """Points of ``target`` at which it is parallel to ``edge``: its distance is extreme there."""
+    """Return the points of ``target`` at which it is parallel to ``edge``: extremes of distance."""
     if isinstance(target, Line):
         if isinstance(edge, Line):
             return ()
@@ -206,7 +207,7 @@ def _extremes(edge: Edge, target: Edge) -> Sequence[Point]:
 
 
 def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
-    """Points at which the line through ``origin`` crosses the edge."""
+    """Return the points at which the line through ``origin`` crosses the edge."""
     if isinstance(edge, Arc):
         points = line_circle(origin, unit, edge.centre, edge.radius)
     else:
@@ -229,11 +230,11 @@ def _on_ray(origin: Point, unit: Point, edge: Edge) -> list[Point]:
 
 
 class Facing(NamedTuple):
-    """Two films with no film between them over some area outside pins' openings.
+    """Two films with no film between them over some area outside the pin openings.
 
-    ``gap`` holds both films, the masks that cover that area from above, and the covered area as
-    its unbonded region; its index is the index of the interface just below the upper film.
-    ``bare`` is the area that no mask covers.
+    ``gap`` holds both films, the masks that cover that area from above, and the covered area as its
+    unbonded region; its index is that of the interface just below the upper film. ``bare`` is the
+    area that no mask covers.
     """
 
     gap: Interface
@@ -241,9 +242,9 @@ class Facing(NamedTuple):
 
 
 def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
-    """Return every pair of films, not adjacent, that face each other outside pins' openings.
+    """Return every pair of non-adjacent films that face each other outside the pin openings.
 
-    Lowest upper film first. Equal shapes are overlaid once.
+    The lowest upper film comes first. Equal shapes are overlaid once.
     """
     pairs: list[Facing] = []
     visible: list[tuple[Layer, Region]] = []
@@ -273,7 +274,7 @@ def facing_films(laminate: Laminate) -> tuple[Facing, ...]:
 def _kept_apart(
     facing: Region, index: int, below: Layer, between: Sequence[Layer], above: Layer
 ) -> Iterator[Facing]:
-    """Yield two films that face each other over a region, unless pins' openings fill it."""
+    """Yield two films that face each other over a region, unless pin openings fill it."""
     bare = facing
     masks: dict[Region, Layer] = {}
     for layer in reversed(between):
@@ -303,9 +304,9 @@ def _minus(region: Region, cut: Region) -> Region:
 
 
 def pin_openings(laminate: Laminate) -> Region:
-    """The openings of bores, lumen and tooling holes, as wide as a hole may be for its pin.
+    """Return the openings of bores, lumen and tooling holes, as wide as their pins allow.
 
-    With nets no pin stands in a bore.
+    If the design has nets, no pin stands in a bore.
     """
     bores = laminate.bores if not laminate.nets else ()
     places = [(bore.centre, bore.diameter) for bore in bores]
@@ -316,7 +317,7 @@ def pin_openings(laminate: Laminate) -> Region:
 
 
 def without_slivers(region: Region) -> Region:
-    """The region without pieces that are on average no wider than TOLERANCE."""
+    """Return the region without pieces whose mean width is at most TOLERANCE."""
     if region.is_empty:
         return region
     pieces = [

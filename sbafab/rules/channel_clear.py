@@ -1,7 +1,4 @@
-"""channel-clear: the common opening of all layers of a channel passes its diameter.
-
-Channels are the chambers' bores and the lumen.
-"""
+"""channel-clear: the common opening of all layers along a channel passes its diameter."""
 
 from __future__ import annotations
 
@@ -21,9 +18,9 @@ from sbafab.rules.sentences import Clause, explained, layer_name, say
 
 
 class Channel(NamedTuple):
-    """A channel and one layer of every pattern that it must be open in.
+    """A channel, with one layer of each pattern that must be open along it.
 
-    ``has_axis``: all openings lie about one axis, as a pin or a tube stands in it.
+    ``has_axis``: all openings must be coaxial, since a pin or tube stands in the channel.
     """
 
     name: Clause
@@ -34,10 +31,11 @@ class Channel(NamedTuple):
 
 
 def channels(laminate: Laminate) -> list[Channel]:
-    """Bores, through the balloons of their chamber, and the lumen, through every layer.
+    """Return the bores, each through the balloons of its chamber, and the lumen, through every
+    layer.
 
-    If nets declare the connections, a bore consists of the holes in films at its place: masks
-    continue over them, and air may pass a film without a hole elsewhere.
+    If nets declare the connections, a bore consists of the holes in the films at its position:
+    masks continue over them, and air may pass a film elsewhere.
     """
     gaps = [gap for gap in laminate.interfaces if gap.kind == "chamber"]
     spans = {
@@ -67,7 +65,7 @@ ON_ONE_PIN = (("base", "wall", "cap"), ("separator-mask",), ("sheet",))
 
 
 def tooling_pins(laminate: Laminate) -> list[Pin]:
-    """Return the pins that stand in neither a bore nor the lumen."""
+    """Return the pins outside all bores and the lumen."""
     axes = [channel.centre for channel in channels(laminate)]
     return [
         pin for pin in laminate.pins if all(math.dist(pin.centre, axis) > LOOSE for axis in axes)
@@ -89,7 +87,7 @@ FINE = 2e-5
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the diameter that passes through each channel, worst against the stated one."""
+    """Return the diameter that passes through each channel, worst case first."""
     laminate = measures.laminate
     clearances = [(channel, *_clear(channel)) for channel in channels(laminate)]
     if not clearances:
@@ -106,7 +104,7 @@ RULE = Rule(NAME, check, explained(NAME))
 
 
 def _clear(channel: Channel) -> tuple[float, Point, Layer]:
-    """Return the diameter that passes a channel, where it does, and the tightest layer."""
+    """Return the diameter that passes through a channel, its position, and the tightest layer."""
     closed = next((a for a in channel.layers if a.profile.contains(channel.centre)), None)
     if closed is not None:
         return 0.0, channel.centre, closed
@@ -137,13 +135,13 @@ def _clear(channel: Channel) -> tuple[float, Point, Layer]:
 
 
 def _signed_room(layer: Layer, edges: Sequence[Edge], p: Point) -> float:
-    """Distance to the nearest of the edges, negative inside the film."""
+    """Return the distance to the nearest edge, negative inside the film."""
     room = min(distance_to(edge, p) for edge in edges)
     return -room if layer.profile.contains(p) else room
 
 
 def _highest(value: Callable[[Point], float], start: Point, reach: float) -> Point:
-    """Maximum of a concave function, by golden section along y within one along x."""
+    """Return the maximum of a concave function, by nested golden-section search in x and y."""
 
     def best_y(x: float) -> float:
         return _golden(lambda y: value((x, y)), start[1] - reach, start[1] + reach)

@@ -1,8 +1,8 @@
 """The rule deck: all rules in the order they are reported, and the functions that run them.
 
-A rule is a file in this folder with a ``RULE`` and a table in ``sentences.toml``, in order; or an
-entry point of an installed package. A rule that cannot be loaded is an error: no design passes
-without it.
+A rule is a file in this folder with a ``RULE`` and a table in ``sentences.toml``, in order, or an
+entry point of an installed package. A rule that fails to load is an error, since no design may skip
+it.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ OWN = {name: f"sbafab.rules.{name.replace('-', '_')}:RULE" for name in catalogue
 RULES: tuple[Rule, ...] = ()
 for _name, _rule in Plugins(plugins.RULES, "rule", Rule, OWN).items():
     if _rule.name != _name:
-        raise DesignError(f"rule {_name} of an installed package calls itself {_rule.name}")
+        raise DesignError(f"rule {_name} from an installed package names itself {_rule.name}")
     RULES += (_rule,)
 
 
 def run_deck(
     laminate: Laminate, design: Design, progress: Progress | None = None
 ) -> tuple[Finding, ...]:
-    """Return the findings of every rule in the deck's order; failures the user waived say so."""
+    """Return the findings of all rules, in deck order, with the user's waivers applied."""
     findings: list[Finding] = []
     measures = Measures(laminate, design)
     for number, rule in enumerate(RULES):
@@ -45,7 +45,7 @@ def run_deck(
 
 
 def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
-    """Return the findings of a rule; failures the user waived and lowered limits are marked."""
+    """Return the findings of a rule, with waived failures and lowered limits marked."""
     weak, waived = lowered(measures.design, rule.name), rule.name in measures.design.rules.waive
     return [
         marked(finding, weak, "the design" if waived else "") for finding in rule.check(measures)
@@ -53,7 +53,7 @@ def run_rule(rule: Rule, measures: Measures) -> list[Finding]:
 
 
 def has_failed(findings: Iterable[Finding]) -> bool:
-    """Return True if a rule failed and is not waived; then nothing may be cut."""
+    """Return True if a rule failed without a waiver; cutting is then blocked."""
     return any(finding.verdict == "fail" for finding in findings)
 
 
@@ -77,7 +77,7 @@ AT_MOST = frozenset(
 
 
 class _Usual(Design):
-    """A design that sets no limit; it has no form."""
+    """A design that sets no limits and has no form."""
 
     @property
     def form(self) -> Form:
@@ -91,7 +91,7 @@ WORST = ("registration-worst-case", "registration-yield")
 
 
 class _Key(NamedTuple):
-    """A key of the design, the rules that it weakens, and where its usual value comes from."""
+    """A design key, the rules that it relaxes, and the source of its default value."""
 
     name: str
     rules: tuple[str, ...]
@@ -136,7 +136,7 @@ KEYS = (
 
 
 def lowered(design: Design, rule: str | None = None) -> tuple[str, ...]:
-    """Return each lowered limit (of one rule) with its value: "bond_width 0.3 (paper 0.75)"."""
+    """Return each lowered limit (of one rule) and its value: "bond_width 0.3 (paper 0.75)"."""
     return tuple(
         weakened(key.name, key.value(design), key.value(USUAL), key.source)
         for key in KEYS
@@ -146,5 +146,5 @@ def lowered(design: Design, rule: str | None = None) -> tuple[str, ...]:
 
 
 def weakened(name: str, value: float, usual: float, source: str) -> str:
-    """Return one lowered limit as every file states it."""
+    """Return one lowered limit in the wording of every file."""
     return f"{name} {value:g} ({source} {usual:g})"

@@ -1,10 +1,9 @@
-"""facing-films: films of two balloons meet only at the bonds that the design intends.
+"""facing-films: films of two balloons meet only at intended bonds.
 
-The press welds any two films that face each other with neither film nor mask between them, if it
-closes on both in one step and their faces bond in that step. Past a smaller balloon the two films
-need not be neighbours. Balloons bond in their neck rings, a sheet in its windows, and all films on
-ears. Elsewhere a mask must lie between them, and reach past the films' edges as far as between
-neighbours.
+The press welds two films that face each other with no film or mask between them if it closes on
+both in one step and their faces bond in that step. Beyond a smaller balloon the two films need not
+be neighbours. Balloons bond in their neck rings, a sheet in its windows, and all films on ears.
+Elsewhere a mask must separate them, with the overhang required between neighbours.
 """
 
 from __future__ import annotations
@@ -67,7 +66,7 @@ RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
-    """Return the first of each set of equal pairs, with their number."""
+    """Return the first of each set of equal pairs, with the size of the set."""
     groups: dict[object, list[Facing]] = {}
     for pair in pairs:
         key = pair.gap.pattern, pair.gap.unbonded, pair.bare
@@ -76,7 +75,7 @@ def _distinct(pairs: Iterable[Facing]) -> list[tuple[Facing, int]]:
 
 
 def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
-    """Bonds between neighbouring balloons that reach a film edge other than a bore's."""
+    """Return the bonds between neighbouring balloons that reach a film edge other than a bore's."""
     for distinct in distinct_interfaces(laminate):
         gap = distinct.interface
         of = {gap.below.balloon, gap.above.balloon}
@@ -96,7 +95,7 @@ def _at_rims(laminate: Laminate) -> Iterator[_Weld]:
 
 
 def _is_ear(piece: Region, laminate: Laminate) -> bool:
-    """Return True if the piece surrounds a tooling hole, within twice its least radius."""
+    """Return True if the piece surrounds a tooling hole, within twice the hole's least radius."""
     for pin in laminate.pins:
         if any(math.dist(pin.centre, bore.centre) < LOOSE for bore in laminate.bores):
             continue
@@ -118,7 +117,7 @@ def _welded(welds: Sequence[_Weld], laminate: Laminate) -> Finding:
 
 
 def _inside(region: Region) -> Point:
-    """A point inside the region: halfway from its longest edge to the edge across."""
+    """Return a point inside the region: midway between its longest edge and the edge opposite."""
     edge = max(region.edges, key=lambda edge: round(edge.length, 9))
     across = outward_reach(edge.reversed(), region.index)
     return beside(edge, (across.value if across is not None else TOLERANCE) / 2)

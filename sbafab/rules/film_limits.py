@@ -1,4 +1,4 @@
-"""film-limits: no web or slot is finer than the laser cuts, and all survive the kerf."""
+"""film-limits: no web or slot is below the laser's limit, and all survive the kerf."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ROUNDING = 1e-6
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The finest web, slot or gap of any layer; and whether the cut path keeps every contour."""
+    """Return the narrowest web, slot or gap of all layers, and whether contours survive kerf."""
     laminate, design = measures.laminate, measures.design
     limit = design.laser.least_feature
     lost = _lost_to_kerf(laminate, design)
@@ -47,7 +47,7 @@ RULE = Rule(NAME, check, explained(NAME))
 
 
 def _finest(laminate: Laminate) -> tuple[Layer, str, Width] | None:
-    """The narrowest web or slot of all layers; wider ones than the holes known are skipped."""
+    """Return the narrowest web or slot of all layers; skip those wider than the known holes."""
     layers = [
         (layers_of_pattern[0], laminate.as_cut(layers_of_pattern[0]))
         for layers_of_pattern in laminate.patterns.values()
@@ -69,7 +69,7 @@ def _finer(layers: Iterable[tuple[Layer, Region]], than: float) -> tuple[Layer, 
 
 
 def _lost_to_kerf(laminate: Laminate, design: Design) -> Finding | None:
-    """The first layer whose cut path has other contours than its profile."""
+    """Return the first layer whose cut path and profile have different contours."""
     for layers in laminate.patterns.values():
         layer = layers[0]
         kerf = design.kerf_widths.get(layer.film.material) or 0.0

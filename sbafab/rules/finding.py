@@ -1,4 +1,4 @@
-"""Findings of rules and checks as data: verdict, value, limit, place, and what they say."""
+"""Findings of rules and checks as data: verdict, value, limit, place and message."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Verdict = Literal["pass", "fail", "waived", "warn"]
 
 
 class Place(NamedTuple):
-    """Place of a worst value: interface (from 1, or None), layer indices, x and y in mm."""
+    """The place of a worst value: interface (from 1, or None), layer indices, x and y in mm."""
 
     interface: int | None = None
     layers: tuple[int, ...] = ()
@@ -27,13 +27,13 @@ class Place(NamedTuple):
 
 @dataclass(frozen=True)
 class Finding:
-    """A verdict with the measured worst value, its limit, unit and place, and what it ``says``.
+    """A verdict with the measured worst value, its limit, unit and place, and its message ``says``.
 
-    ``says`` is a sentence of the catalogue with its facts, or the text of a rule of another
-    package. ``waived_by`` the design, or the assembly, if that waives a failure by name; a rule
-    grants a waiver itself too (a flush mask at a pinned bore). ``lowered`` lists the limits that
-    the design lowers. ``interval`` is the 95 % interval of a counted share; ``parts`` are the parts
-    of an assembly that it is about; ``design`` is the design's name if there are several.
+    ``says`` is a catalogue sentence with its facts, or the text of another package's rule.
+    ``waived_by`` is the design or assembly that waives a failure by name; a rule may also grant a
+    waiver (a flush mask at a pinned bore). ``lowered`` lists the limits that the design lowers.
+    ``interval`` is the 95 % interval of a sampled share; ``parts`` are the assembly parts
+    concerned; ``design`` is the design's name if there are several.
     """
 
     rule: str
@@ -56,7 +56,7 @@ class Finding:
 
     @property
     def id(self) -> str:
-        """The rule, and which of its sentences it says: "bond-width.narrowest"."""
+        """The rule and the id of its sentence: "bond-width.narrowest"."""
         return self.rule if isinstance(self.says, str) else self.says.id
 
     @property
@@ -66,7 +66,7 @@ class Finding:
 
     @property
     def remedy(self) -> str:
-        """The action that a warning asks for; the message begins with it."""
+        """The action that a warning recommends, at the start of its message."""
         if isinstance(self.says, str) or self.verdict != "warn":
             return ""
         remedy = self.says._replace(id=self.says.id + REMEDY)
@@ -74,7 +74,7 @@ class Finding:
 
     @property
     def message(self) -> str:
-        """The finding in one sentence."""
+        """The finding as one sentence."""
         sentence = self.says if isinstance(self.says, str) else tell(self.says, self._facts)
         text = ": ".join(filter(None, (self.remedy, sentence)))
         if self.lowered:
@@ -99,7 +99,7 @@ def judged(
     /,
     **facts: Any,
 ) -> Finding:
-    """Return a finding that says a sentence of its rule, or that one's "-fail" if it fails."""
+    """Return a finding with a sentence of its rule, or that sentence's "-fail" form if it fails."""
     if isinstance(verdict, bool):
         verdict = "pass" if verdict else "fail"
     name = f"{rule}.{sentence}"
@@ -111,9 +111,9 @@ def judged(
 
 
 def marked(finding: Finding, lowered: tuple[str, ...], waived_by: str) -> Finding:
-    """Return a finding with the lowered limits it was held against, waived by a user if it failed.
+    """Return a finding with the lowered limits that apply, waived by a user if it failed.
 
-    What a rule waives itself states no lowered limits.
+    A waiver granted by the rule states no lowered limits.
     """
     if lowered and finding.verdict != "waived":
         finding = replace(finding, lowered=lowered)
@@ -125,8 +125,7 @@ def marked(finding: Finding, lowered: tuple[str, ...], waived_by: str) -> Findin
 def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
     """Return the finding that decides each rule's verdict, in the order of the rules.
 
-    A failure precedes a warning, then a waiver by the user, then a pass; a waiver by the rule is
-    last.
+    The order of precedence is failure, warning, user waiver, pass, rule waiver.
     """
     deciding: dict[str, Finding] = {}
     for finding in findings:
@@ -137,14 +136,14 @@ def decisive(findings: Iterable[Finding]) -> dict[str, Finding]:
 
 
 def summary(findings: Iterable[Finding]) -> dict[str, int]:
-    """The overall verdict and the number of rules by verdict, as ``checks.json`` holds it."""
+    """Return the overall verdict and the number of rules by verdict, as in ``checks.json``."""
     counts = Counter(finding.verdict for finding in decisive(findings).values())
     verdicts: tuple[Verdict, ...] = ("pass", "warn", "waived", "fail")
     return {"holds": counts["fail"] == 0, **{name: counts[name] for name in verdicts}}
 
 
 def counted(*groups: Iterable[Finding]) -> str:
-    """Return the number of rules in groups of findings, and of warnings, waived and failed ones."""
+    """Return the numbers of rules, warnings, waivers and failures in groups of findings."""
     counts: Counter[str] = Counter()
     for findings in groups:
         counts.update(finding.verdict for finding in decisive(findings).values())
@@ -164,13 +163,13 @@ def _gravity(finding: Finding) -> int:
 
 
 class Findings(tuple[Finding, ...]):
-    """Findings of the deck in its order: a tuple that displays as a table, and is true if ok."""
+    """The deck's findings in order: a tuple that displays as a table and is true if ok."""
 
     __slots__ = ()
 
     @property
     def ok(self) -> bool:
-        """True if no rule failed that the design does not waive: it may be cut."""
+        """True if every failure is waived, so that the design may be cut."""
         return not self.failed
 
     def __bool__(self) -> bool:
@@ -178,12 +177,12 @@ class Findings(tuple[Finding, ...]):
 
     @property
     def failed(self) -> tuple[Finding, ...]:
-        """Failures that are not waived."""
+        """The failures without a waiver."""
         return tuple(finding for finding in self if finding.verdict == "fail")
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One flat row for each finding."""
+        """Return one flat row for each finding."""
         return [
             {
                 "rule": f.rule,

@@ -1,4 +1,4 @@
-"""When a value passes a limit."""
+"""Comparison of values with limits."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ TOLERANCE = 0.001
 
 
 def holds(measured: float, limit: float) -> bool:
-    """True if a value reaches a least limit, to within TOLERANCE (with room for rounding)."""
+    """Return True if a value is at least ``limit``, within TOLERANCE and rounding."""
     return measured >= least_passing(limit)
 
 
 def least_passing(limit: float) -> float:
-    """Return the least value that passes a least limit."""
+    """Return the least value that passes a lower limit."""
     return limit - TOLERANCE - 1e-9

@@ -1,7 +1,7 @@
-"""Margins: the narrow places of bonds and overhangs, the owners of their edges, and their losses.
+"""Margins: narrow places of bonds and overhangs, the owners of their edges, and their losses.
 
-To first order in the small displacements, the width left at a place is its nominal width and the
-change along the normal there, which is linear in every cutting error, shift and turn.
+To first order in small displacements, the remaining width is the nominal width plus the change
+along the normal, which is linear in every cutting error, shift and rotation.
 """
 
 from __future__ import annotations
@@ -46,10 +46,11 @@ UNCUT: Final = -1
 
 
 class Owner(NamedTuple):
-    """Owner of an edge: a layer's seat in the interface, contour and piece of its profile.
+    """The owner of an edge: a layer's seat in the interface, and the contour and piece of its
+    profile.
 
-    Seats are 0 below, 1 above, then the masks, then the seams, with their regions for profiles. The
-    contour is UNCUT if a margin does not end at a cut edge: in an overlap of two seams.
+    Seats are 0 below, 1 above, then the masks, then the seams, with their regions as profiles. The
+    contour is UNCUT if a margin ends at no cut edge: in an overlap of two seams.
     """
 
     seat: int
@@ -69,11 +70,10 @@ Owners = tuple[Owner, Owner]
 
 
 class Places(NamedTuple):
-    """Places from an edge of one owner to an edge of another.
+    """Places between an edge of one owner and an edge of another.
 
-    ``numbers`` are their places among all of an interface, in the order of detection. ``columns``
-    has a column for each place: mm apart, x and y of its start and of its end, and of the unit
-    vector from one to the other.
+    ``numbers`` index the interface's places in the order of detection. ``columns`` has a column for
+    each place: distance in mm, x and y of its start and end, and the unit vector from start to end.
     """
 
     owners: Owners
@@ -140,8 +140,8 @@ def pin_at(edge: Edge, pins: tuple[Pin, ...]) -> Pin | None:
 def group_interfaces(laminate: Laminate, facing: Iterable[Facing], moves: Freedoms) -> list[Equal]:
     """Return interfaces grouped by equal profiles and equal freedoms.
 
-    Films that face each other past a smaller balloon count as a separate interface;
-    facing-films reports the pairs without a mask between them.
+    Films that face each other beyond a smaller balloon form a separate interface; facing-films
+    reports the pairs without a mask between them.
     """
     groups: dict[object, list[Interface]] = {}
     faced = [pair.gap for pair in facing if pair.bare.is_empty]
@@ -158,9 +158,9 @@ def group_interfaces(laminate: Laminate, facing: Iterable[Facing], moves: Freedo
 
 
 def most_loss(interface: Interface, design: Design, moves: Freedoms) -> float:
-    """Return the most that an interface's margins lose when everything moves together, mm.
+    """Return the largest loss of an interface's margins if every displacement adds up, mm.
 
-    A place that is wider than the narrowest by more than this is never the worst.
+    A place that is wider than the narrowest by more than this loss is never the worst.
     """
     loose = {id(way): way for ways in unshared(moves, seated(interface)) for way in ways}.values()
     box = interface.contact.bounds
@@ -169,7 +169,7 @@ def most_loss(interface: Interface, design: Design, moves: Freedoms) -> float:
 
 
 def _farthest(freedom: Freedom, box: Bounds) -> float:
-    """The longest lever of a turn in a box; 1 for a shift."""
+    """Return the longest lever arm of a rotation in a box; 1 for a shift."""
     if freedom.centre is None:
         return 1.0
     return max(math.dist(freedom.centre, (x, y)) for x in box[::2] for y in box[1::2])
@@ -186,8 +186,8 @@ def bond_places(
 ) -> list[Places]:
     """Return a bond's places at most ``slack`` mm wider than its narrowest.
 
-    ``widest`` is the largest slack of any interface with the same bond; ``profiles`` are those of
-    ``layers`` films and masks, by seat, and of seams.
+    ``widest`` is the largest slack of any interface with the same bond; ``profiles`` holds the
+    profiles of films and masks, by seat, and of seams.
     """
     narrow = overlap_pairs(bond, widest, SHARP, least)
     if slack < widest:
@@ -201,9 +201,9 @@ def bond_places(
 
 
 def _without_necks(places: list[Places], layers: int) -> list[Places]:
-    """Places without those at which two seams cross at both ends, and that either may narrow.
+    """Return places except those where two seams cross at both ends and either may narrow the bond.
 
-    How far the seams may be moved there is measured by their overlap.
+    The overlap of the seams limits their displacement there.
     """
     seams = [tuple(o.seat for o in both.owners if o.seat >= layers) for both in places]
     ends = [list(map(tuple, both.columns[1:5].T.tolist())) for both in places]
@@ -230,9 +230,9 @@ def _with_places(places: Iterable[Places]) -> list[Places]:
 def overhang_places(
     mask: Region, free: tuple[tuple[Edge, Reach], ...], slack: float, profiles: tuple[Region, ...]
 ) -> list[Places]:
-    """Return places from films' edges to masks', at most ``slack`` mm wider than the nearest.
+    """Return places from film edges to mask edges, at most ``slack`` mm wider than the nearest.
 
-    Each edge's own reach comes first, then its samples. ``profiles`` are of two films and masks.
+    Each edge's own distance comes first, then its samples. ``profiles``: of two films and masks.
     """
     within = min(reach.value for _, reach in free) + slack + ROOM
     near = [(edge, reach) for edge, reach in free if reach.value <= within]
@@ -255,7 +255,7 @@ def overhang_places(
 def overlap_places(
     interface: Interface, overlaps: Sequence[Overlap], after: int
 ) -> Iterator[Places]:
-    """Yield overlaps of seams as places of bonds: as wide as they are deep, moved as a whole.
+    """Yield overlaps of seams as bond places as wide as the overlap's depth, which move as a whole.
 
     They are numbered from ``after`` on.
     """
@@ -277,9 +277,10 @@ def narrow_places(
     design: Design,
     moves: Freedoms,
 ) -> Iterator[Narrow]:
-    """Yield all margins that could become the least under the tolerances, or fall short of a
-    limit, of the first of each group of interfaces: its bond's least width and the overlaps of its
-    seams, then the masks' reaches past film edges.
+    """Yield all margins that may become the narrowest or fall short of a limit, for the first of
+    each group of interfaces.
+
+    The order is the bond width, the overlaps of seams, then the masks' overhangs past film edges.
     """
     losses = [most_loss(first, design, moves) for first, *_ in groups]
     # Of one bond all interfaces ask for the same places.
@@ -320,7 +321,7 @@ Seats = Sequence[tuple[int, Region]]
 
 
 def _owned(columns: Floats, at_start: Seats, at_end: Seats) -> list[Places]:
-    """Places by the owners of their edges, once for each pair of owners."""
+    """Return places grouped by pairs of edge owners."""
     start, end, normal = columns[1:3], columns[3:5], columns[5:]
     ours, first, firsts = _owners(start, normal, at_start)
     theirs, last, lasts = _owners(end, normal, at_end)
@@ -339,9 +340,9 @@ def _owned(columns: Floats, at_start: Seats, at_end: Seats) -> list[Places]:
 
 
 def _owners(p: Floats, normal: Floats, seats: Seats) -> tuple[Indices, Indices, list[Owner]]:
-    """Owners of the edges through each point: of those square to its normal, if any, else all.
+    """Return the owners of the edges through each point: those square to its normal, else all.
 
-    Points in rising order, for each the numbers of its owners, and these.
+    Returns points in rising order, the numbers of each point's owners, and the owners.
     """
     shapes = [(seat, _profile(profile)) for seat, profile in seats]
     owners = [Owner(seat, n, piece) for seat, s in shapes for n, piece in enumerate(s.pieces)]
@@ -368,7 +369,7 @@ def _owners(p: Floats, normal: Floats, seats: Seats) -> tuple[Indices, Indices, 
 
 
 class _Profile(NamedTuple):
-    """The edges of a layer, contour by contour, with the contour of each and its piece."""
+    """The edges of a layer, contour by contour, with the contour and piece of each."""
 
     table: EdgeTable
     contour: Indices
@@ -389,7 +390,7 @@ def _profile(profile: Region) -> _Profile:
 
 
 class Rays(NamedTuple):
-    """Points spread over edges, the outward unit normals there, and the numbers of their edges."""
+    """Points along edges, their outward unit normals, and the numbers of their edges."""
 
     start: Floats
     outward: Floats
@@ -405,7 +406,7 @@ class Rays(NamedTuple):
 def first_met(rays: Rays, table: EdgeTable, within: float) -> tuple[Indices, Floats, Floats]:
     """Return the first edge that each ray meets: number of the ray, distance (mm) and point.
 
-    Edges farther off than ``within`` may be left out.
+    Edges beyond ``within`` may be omitted.
     """
     boxes = boxes_round(rays.start, rays.start + within * rays.outward, END_ROOM)
     ray, number = touching(boxes, table.box)
@@ -426,7 +427,7 @@ def first_met(rays: Rays, table: EdgeTable, within: float) -> tuple[Indices, Flo
 
 
 def _on(edges: EdgeTable, q: Floats) -> Bools:
-    """True for points of their lines and circles that lie between the ends of edges."""
+    """Return True for points between the ends of edges, given points on their lines and circles."""
     chord = edges.end - edges.start
     square = dot(chord, chord)
     t = dot(chord, q - edges.start) / np.where(square == 0, 1.0, square)
@@ -442,11 +443,11 @@ def _on(edges: EdgeTable, q: Floats) -> Bools:
 
 
 class Margins(NamedTuple):
-    """The margins of equal interfaces between the edges of the same two owners.
+    """The margins of equal interfaces between edges of the same two owners.
 
-    ``moves`` are the freedoms that only one of both parts has, with their sign: 1 if it moves the
-    end. ``levers`` has a row for each of these and a column for each place: the signed mm per
-    radian of a turn, 0 for a shift.
+    ``moves`` are the freedoms that only one of the two parts has, with a sign: 1 if it moves the
+    end. ``levers`` has a row for each move and a column for each place: the signed mm per radian of
+    a rotation, 0 for a shift.
     """
 
     interfaces: Equal
@@ -462,7 +463,7 @@ class Margins(NamedTuple):
 
     @property
     def costs(self) -> Floats:
-        """The most that each move takes from each margin, mm: a row a move."""
+        """Return the largest loss of each margin due to each move, mm: one row per move."""
         rows = [
             np.full(len(lever), way.most) if way.centre is None else way.most * np.abs(lever)
             for (way, _), lever in zip(self.moves, self.levers, strict=True)
@@ -471,7 +472,7 @@ class Margins(NamedTuple):
 
     @property
     def pinned_loss(self) -> float:
-        """What all moves take that do not depend on the hand, mm."""
+        """Return the loss due to all moves other than hand placement, mm."""
         return sum([freedom.most for freedom, _ in self.moves if not freedom.by_hand], 0.0)
 
 
@@ -490,7 +491,7 @@ def margins_of(narrow: Iterable[Narrow], moves: Freedoms) -> Iterator[Margins]:
 def relative_freedoms(
     owners: Owners, layers: Sequence[int], moves: Freedoms
 ) -> Iterator[tuple[Freedom, float]]:
-    """Yield the freedoms that only one of two edges has: with 1 if it is the end's, else -1.
+    """Yield the freedoms of only one of two edges, with 1 for the end's and -1 for the start's.
 
     ``layers`` are the interface's layers, by seat.
     """

@@ -1,7 +1,7 @@
-"""mask-overhang: the masks reach past every film edge they keep apart (paper Sec. 2).
+"""mask-overhang: masks extend past every film edge that they separate (paper Sec. 2).
 
-Short of that, film over-melts at the edge. At a bore with a dowel pin a flush mask is intended (the
-pin holds all layers by it); it is reported as waived, by the pin's name.
+With less overhang, film over-melts at the edge. At a bore with a dowel pin, a flush mask is
+intended because the pin holds all layers by it; it is reported as waived, with the pin's name.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ _Overhang = tuple[float, Point, DistinctInterface]
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the least reach of any mask past an edge of unbonded film, and pins' waivers."""
+    """Return the least overhang of a mask past an edge of unbonded film, and waivers at pins."""
     pins, limit = measures.laminate.pins, measures.design.rules.mask_overhang
     free: list[_Overhang] = []
     pinned: dict[str, list[_Overhang]] = {}

@@ -1,4 +1,4 @@
-"""Measures that several rules share: computed once for a laminate against one design."""
+"""Measures shared by several rules, computed once for a laminate and a design."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from sbafab.rules.sentences import Clause, say
 class Measures:
     """Lazily computed measures; the deck passes one object to all rules.
 
-    ``pause`` is called between parts of long work; an exception from it ends the work.
+    ``pause`` is called between parts of long work; an exception in it stops the work.
     """
 
     def __init__(
@@ -46,9 +46,10 @@ class Measures:
         self._reaches = cache(_reaches)
 
     def by_hand(self, design: Design) -> Measures:
-        """Measures of the same laminate under ``design`` with a hand no rougher than this one.
+        """Return measures for ``design``, whose hand placement is at least as accurate.
 
-        Places that are narrow with the rougher hand include every narrow place of a steadier one.
+        Places that are narrow with coarser hand placement include every narrow place of a finer
+        one.
         """
         steadier = Measures(self.laminate, design, self.pause)
         steadier.equal, steadier.narrow, steadier.laid = self.equal, self.narrow, self.laid
@@ -56,7 +57,7 @@ class Measures:
 
     @cached_property
     def facing(self) -> tuple[Facing, ...]:
-        """Films that face each other past others, and that a closing of the press would weld."""
+        """Pairs of non-adjacent films that face each other and that a press closing would weld."""
         laminate = self.laminate
         pressed = [set(step.layers) for step in press_steps(laminate)]
         return tuple(
@@ -80,17 +81,17 @@ class Measures:
 
     @cached_property
     def moves(self) -> Freedoms:
-        """Freedoms of every piece of every layer."""
+        """The freedoms of every piece of every layer."""
         return freedoms(self.laminate, self.design, self.laid)
 
     @cached_property
     def laid(self) -> list[Laid]:
-        """Every body in the order in which they are laid."""
+        """Every body, in the order of laying."""
         return lay_up(self.laminate)
 
     @cached_property
     def equal(self) -> list[Equal]:
-        """Interfaces by equal profiles and freedoms."""
+        """Interfaces grouped by equal profiles and freedoms."""
         return group_interfaces(self.laminate, self.facing, self.moves)
 
     @cached_property
@@ -133,14 +134,14 @@ def _reaches(unbonded: Region, contact: Region, mask: Region) -> tuple[tuple[Edg
 
 
 class DistinctInterface(NamedTuple):
-    """The first of a set of interfaces with equal profiles, and their number."""
+    """The first of a set of equal interfaces, and the size of the set."""
 
     interface: Interface
     number: int
 
     @property
     def name(self) -> Clause:
-        """The interface as sentences name it, with the number of others like it."""
+        """The interface's name in sentences, with the number of equal interfaces."""
         named = interface_name(self.interface)
         if self.number == 1:
             return named
@@ -156,12 +157,12 @@ def distinct_interfaces(laminate: Laminate) -> tuple[DistinctInterface, ...]:
 
 
 def interface_name(interface: Interface) -> Clause:
-    """Return an interface as sentences name it, with its layers."""
+    """Return an interface's name in sentences, with its layers."""
     below, above = interface.below.index, interface.above.index
     kind, index = interface.kind, interface.index
     return say("words.interface", kind=kind, index=index, below=below, above=above)
 
 
 def place_in(interface: Interface, p: Point | None = None) -> Place:
-    """Return a place in an interface, mm."""
+    """Return a place in an interface, from a point in mm."""
     return Place(interface.index, interface.layer_indices, *(p or (None, None)))

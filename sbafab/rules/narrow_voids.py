@@ -1,15 +1,16 @@
-"""Narrow places of voids at worst: the width left by cutting, kerf and seams, and what opens them.
+"""Narrow places of voids at worst: the width left by cutting, kerf and seams, and the opening
+pressure.
 
-A cut edge lies off by the cutting error, and by half of a kerf that is not measured. An edge of a
-seam lies off by its tool's error of place; two edges of one seam move together, and lose nothing.
+A cut edge deviates by the cutting error, and by half of an unmeasured kerf. A seam's edge deviates
+by its tool's position error; two edges of one seam move together, without loss.
 
-A channel between films bonded at both sides is a long plate clamped at its edges. Under a
-pressure p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The
-first term is its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed.,
-Sec. 3: d = p w^4 / 384 D), the second its stretching: a parabola is longer than its chord by
-8 d^2 / 3 w, and a tension T in it carries p = 8 T d / w^2. The channel counts as open if d is
-the thickness of the film beside it. Films bonded behind that film there stiffen it, so that a wide
-place between many films may be harder to open than a narrow one between two.
+A channel between films bonded at both sides is a long plate clamped at its edges. Under a pressure
+p it lifts by d in its middle: p = E / (1 - nu^2) / w^4 (32 t^3 d + 64/3 t d^3). The first term is
+its bending (Timoshenko and Woinowsky-Krieger, Theory of Plates and Shells, 2nd ed., Sec. 3: d = p
+w^4 / 384 D), the second its stretching: a parabola is longer than its chord by 8 d^2 / 3 w, and a
+tension T in it carries p = 8 T d / w^2. The channel counts as open if d equals the thickness of the
+adjacent film. Films bonded behind it stiffen it, so a wide place between many films may be harder
+to open than a narrow one between two.
 """
 
 from __future__ import annotations
@@ -37,9 +38,9 @@ NEAR: Final = 1e-5
 
 
 class VoidEdges(NamedTuple):
-    """The edges that bound the voids of an interface, with their errors of place, mm.
+    """The edges that bound the voids of an interface, with their position errors, mm.
 
-    ``kerf`` is the unknown kerf, ``seams`` the bonding seams with their tools' errors.
+    ``kerf`` is the unknown kerf; ``seams`` are the bonding seams with their tools' errors.
     """
 
     cutting: float
@@ -59,12 +60,12 @@ class VoidEdges(NamedTuple):
 
     @property
     def most(self) -> float:
-        """The most that can be lost between any two edges, mm."""
+        """The largest possible loss between any two edges, mm."""
         return 2 * max([self._cut, *(error for _, error in self.seams)])
 
     @property
     def with_seams_in_place(self) -> VoidEdges:
-        """The edges with every seam on its path."""
+        """Return the edges with every seam on its path."""
         return self._replace(seams=tuple((region, 0.0) for region, _ in self.seams))
 
     @property
@@ -72,7 +73,7 @@ class VoidEdges(NamedTuple):
         return self.cutting + self.kerf / 2
 
     def left(self, place: Width) -> Width:
-        """Return the place as narrow as it can become; its width is 0 if it closes."""
+        """Return the place at its smallest width; 0 if it closes."""
         at_start, at_end = self._lost(place.start, place.end)
         if at_start + at_end >= place.value:
             return Width(0.0, place.middle, place.middle)
@@ -85,7 +86,7 @@ class VoidEdges(NamedTuple):
         )
 
     def _lost(self, p: Point, q: Point) -> tuple[float, float]:
-        """The most that the edges at two points lose towards each other, mm."""
+        """Return the largest loss between the edges at two points, mm."""
         pairs = ((a, b) for a in self._at(p) for b in self._at(q))
         return max(
             (
@@ -96,7 +97,7 @@ class VoidEdges(NamedTuple):
         )
 
     def _at(self, p: Point) -> list[tuple[int | None, float]]:
-        """The seams whose edges run through a point, by number, with their errors of place."""
+        """Return the seams with an edge through a point, by number, with their position errors."""
         beside: list[tuple[int | None, float]] = [
             (number, error)
             for number, (region, error) in enumerate(self.seams)
@@ -107,7 +108,8 @@ class VoidEdges(NamedTuple):
     def narrow_places(self, void: Region, widest: float = 0.0) -> Iterator[tuple[Width, Width]]:
         """Yield places of a void as drawn, each with its worst case, narrow places first.
 
-        They include the narrowest at worst, and every place at most ``widest`` mm wide at worst.
+        These include the narrowest in the worst case, and every place then at most ``widest`` mm
+        wide.
         """
         least = least_width(void, 0.0)
         if least is None:
@@ -123,7 +125,7 @@ class VoidEdges(NamedTuple):
             yield place, self.left(place)
 
     def causes(self) -> Clause:
-        """Return the causes of the loss, as sentences name them."""
+        """Return the causes of the loss, as worded in messages."""
         if self.seams:
             errors = " or ".join(f"{error:g}" for error in sorted({e for _, e in self.seams}))
             return say("words.seams-off", errors=errors)
@@ -145,7 +147,7 @@ WIDEST = 3.0
 
 
 class OpeningPlace(NamedTuple):
-    """A place of a channel as drawn, and the width ``left`` at worst, mm, with its opening kPa.
+    """A place of a channel as drawn, its worst-case width ``left``, mm, and opening pressure, kPa.
 
     The pressure is None if no film is known.
     """
@@ -158,10 +160,10 @@ class OpeningPlace(NamedTuple):
 def hardest_place(
     laminate: Laminate, interface: Interface, void: Region, edges: VoidEdges
 ) -> OpeningPlace | None:
-    """Return the place of a void that takes most pressure to open; None if no edges face there.
+    """Return the place of a void with the highest opening pressure; None if no edges face.
 
-    Pressures are those at which either film lifts by its thickness, where the ``edges`` lie off at
-    worst; without elastic constants of either it is the narrowest place. A model, not measured.
+    At that pressure either film lifts by its thickness, with the ``edges`` at their worst; without
+    elastic constants it is the narrowest place. A model, not a measurement.
     """
     places = edges.narrow_places(void)
     narrowest, remaining = min(places, key=lambda place: place[1].value, default=(None, None))
@@ -173,7 +175,7 @@ def hardest_place(
         return worst
 
     def most(width: float) -> float:
-        """The kPa that open a place of this width at most: with all films behind it bonded."""
+        """Return an upper bound of the opening pressure, kPa, at this width: all films bonded."""
         loads = [side.lifting(len(side.films), width) for side in sides]
         return min((load for load in loads if load is not None), default=math.inf)
 
@@ -196,9 +198,9 @@ def hardest_place(
 
 
 class _Side(NamedTuple):
-    """The films on one side of a void, outward, and the parts of it over which each next is bonded.
+    """The films on one side of a void, outward, and the parts over which each next film is bonded.
 
-    Each part lies in the one before.
+    Each part lies within the previous one.
     """
 
     films: tuple[Film, ...]
@@ -220,7 +222,7 @@ class _Side(NamedTuple):
         return cls(tuple(films), tuple(bonded))
 
     def lifting(self, count: int, width: float) -> float | None:
-        """Return the kPa at which the first films, bonded, lift by the thickness of the first."""
+        """Return the pressure (kPa) that lifts the first bonded films by the first's thickness."""
         films = self.films[:count]
         elastic = [film.elastic for film in films if film.elastic is not None]
         if len(elastic) < count:
@@ -231,10 +233,10 @@ class _Side(NamedTuple):
         return plane * stiffness / width**4
 
     def pressure(self, p: Point, q: Point) -> float | None:
-        """Return the kPa that lift this side somewhere between two walls.
+        """Return the pressure in kPa that lifts this side somewhere between two walls.
 
-        At most what lifts the stiffest films there over the whole width, and what lifts any
-        stretch of softer ones between stiffer.
+        It is at most the pressure that lifts the stiffest films over the whole width, or any
+        stretch of softer films between stiffer ones.
         """
         length = math.dist(p, q)
         runs = list(self._runs(Line(p, q)))
@@ -243,7 +245,7 @@ class _Side(NamedTuple):
         return min((load for load in loads if load is not None), default=None)
 
     def _runs(self, across: Line) -> Iterator[tuple[int, float]]:
-        """Yield how many films are bonded along stretches of a line, with their shares of it."""
+        """Yield the number of bonded films along stretches of a line, and length fractions."""
         edges = (edge for part in self.bonded for edge in part.index.touching(across.bounds))
         shares = sorted(across.parameter(m) for edge in edges for m in meeting_points(across, edge))
         stretches = [
@@ -259,7 +261,7 @@ class _Side(NamedTuple):
 
 
 def _pressure(sides: Sequence[_Side], width: Width) -> float | None:
-    """Return the kPa that lift either side; the larger of both if bonds behind it end."""
+    """Return the pressure in kPa that lifts either side; the larger one if bonds behind it end."""
     if width.value <= TOUCH:
         return math.inf
     (x, y), (u, v) = width.start, width.end
@@ -273,7 +275,7 @@ def _pressure(sides: Sequence[_Side], width: Width) -> float | None:
 
 
 def _split(void: Region, parts: Sequence[Region], reach: float) -> Region:
-    """Return a void whose edges are cut where edges of parts of it within reach begin or turn."""
+    """Return a void whose edges are split where nearby edges of its parts begin or turn."""
     contours = []
     for contour in void.contours:
         edges: list[Edge] = []

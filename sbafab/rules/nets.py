@@ -1,7 +1,7 @@
 """nets: the voids join the ports of every declared net, and join nothing else (fluidic LVS).
 
-Layout versus schematic, as for a chip: the void graph is read back from the profiles and compared
-with the nets. A design that declares no nets gets no finding.
+As in a chip's layout-versus-schematic check, the void graph is extracted from the profiles and
+compared with the nets. A design without nets gets no finding.
 """
 
 from __future__ import annotations
@@ -55,8 +55,8 @@ FaultKind = Literal["open", "short", "leak", "dead-end", "stray"]
 class NetFault(NamedTuple):
     """A difference between nets and voids, with its place.
 
-    ``nets`` are the nets that it concerns; ``interface``, None for a hole of an outer film, and
-    ``layers`` count from 1, and ``at`` is its place in mm.
+    ``nets`` are the nets concerned; ``interface`` (None at a hole in an outer film) and ``layers``
+    count from 1; ``at`` is the point in mm.
     """
 
     kind: FaultKind
@@ -68,7 +68,7 @@ class NetFault(NamedTuple):
 
     @property
     def message(self) -> str:
-        """The difference in one sentence."""
+        """The difference as one sentence."""
         return tell(self.says, {"at": self.at})
 
     @property
@@ -87,10 +87,10 @@ class NarrowPlace(NamedTuple):
 
 
 class Connectivity(NamedTuple):
-    """The voids of a laminate against its nets.
+    """The voids of a laminate compared with its nets.
 
-    ``owners`` holds the names of each cavity's nets, empty for a slit or hole; ``groups`` the names
-    of ports and chambers that are joined, ``faults`` the deviations from the declared nets.
+    ``owners`` holds the net names of each cavity, empty for a slit or hole; ``groups`` the names of
+    connected ports and chambers; ``faults`` the deviations from the declared nets.
     """
 
     cavities: tuple[Cavity, ...]
@@ -121,7 +121,7 @@ RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def declared(laminate: Laminate) -> tuple[Net, ...]:
-    """Return the nets, and a separate net for every chamber and port that no net names."""
+    """Return the declared nets, and a separate net for every other chamber and port."""
     named = {member for net in laminate.nets for member in net.ports}
     names = [chamber.name for chamber in laminate.chambers] + [p.name for p in laminate.ports]
     alone = (Net(name, (name,)) for name in dict.fromkeys(names) if name not in named)
@@ -131,7 +131,7 @@ def declared(laminate: Laminate) -> tuple[Net, ...]:
 def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Connectivity:
     """Return the voids of a laminate, their nets, and the deviations from the declared nets.
 
-    Without ``faults`` the deviations are not searched for.
+    Deviations are sought only if ``faults`` is set.
     """
     read = _Reading(laminate)
     owners = tuple(tuple(sorted(read.owners.get(part, ()))) for part in read.parts)
@@ -146,10 +146,10 @@ def connectivity(laminate: Laminate, design: Design, faults: bool = True) -> Con
 def netlist_findings(
     laminate: Laminate, design: Design, netlist: Netlist, file: str
 ) -> list[Finding]:
-    """Return the findings of a laminate against a netlist alone, in place of its own nets.
+    """Return the findings of a laminate compared with a netlist, which replaces its own nets.
 
-    Ports of the netlist that have a place need not exist in the laminate; the names of other
-    ports and of chambers must.
+    Ports with a position need not exist in the laminate; the names of other ports and of chambers
+    must.
     """
     placed = {port.name for port in netlist.ports}
     ports_drawn = (port for port in laminate.ports if port.name not in placed)
@@ -184,9 +184,9 @@ def _missing(name: str, names: Iterable[str]) -> tuple[Place, Clause]:
 
 
 class _Terminal(NamedTuple):
-    """The place of a port or chamber; one of the ``cavities`` must belong to it.
+    """The place of a port or chamber, which one of the ``cavities`` must contain.
 
-    ``layers`` are the layers that it lies between; empty for an inlet.
+    ``layers`` are the layers on either side; empty for an inlet.
     """
 
     member: str
@@ -201,9 +201,9 @@ class _Terminal(NamedTuple):
 class _Reading:
     """The void graph of a laminate with the places of its ports.
 
-    ``part_of`` numbers the parts into which the voids fall without the outside, ``parts`` those of
-    the cavities. ``homes`` are the parts of each net's terminals, None for one in no void;
-    ``owners`` the nets that have a terminal in a part.
+    ``part_of`` numbers the connected parts of the voids without the outside; ``parts`` gives each
+    cavity's part. ``homes`` gives the part of each net's terminals, None outside all voids;
+    ``owners`` the nets with a terminal in a part.
     """
 
     def __init__(self, laminate: Laminate) -> None:
@@ -226,15 +226,15 @@ class _Reading:
         return self.laminate.interfaces[index - 1]
 
     def of_net(self) -> Iterator[tuple[int, Cavity, Interface, tuple[str, ...]]]:
-        """Yield the number of each cavity, the cavity, its interface and the nets of its part."""
+        """Yield each cavity's number, the cavity, its interface and the nets of its part."""
         for number, (cavity, part) in enumerate(zip(self.cavities, self.parts, strict=True)):
             gap = self.interface(cavity.interface)
             yield number, cavity, gap, self.owners.get(part, ())
 
     def _home(self, net: Net) -> dict[_Terminal, int | None]:
-        """The part that holds each terminal of a net.
+        """Return the part that holds each terminal of a net.
 
-        A terminal that several cavities may hold lies in the net's main part if one of them does.
+        If several cavities qualify, the cavity in the net's main part is preferred.
         """
         rows = [row for member in net.ports for row in self._terminals(member)]
         parts = {row: [self.parts[number] for number in row.cavities] for row in rows}
@@ -273,7 +273,7 @@ class _Reading:
                     yield _Terminal(member, label, holding, p, 0.0, True, layers)
 
     def _holding(self, p: Point, layers: tuple[int, int]) -> tuple[int, ...]:
-        """The cavities between a pair of layers that hold a point."""
+        """Return the cavities between a pair of layers that contain a point."""
         return tuple(
             number
             for number, cavity in enumerate(self.cavities)
@@ -283,12 +283,12 @@ class _Reading:
         )
 
     def _beside(self, void: Void) -> tuple[int, ...]:
-        """The cavities that a hole of a film, or a mouth, opens into."""
+        """Return the cavities that a film hole or mouth opens into."""
         voids = self.graph.joins.get(void, {})
         return tuple(sorted({self.cavity_of[v] for v in voids if v in self.cavity_of}))
 
     def groups(self) -> tuple[frozenset[str], ...]:
-        """The connected members, by part; a member outside all voids is alone."""
+        """Return the connected members, by part; a member outside all voids is alone."""
         groups: dict[object, set[str]] = {}
         for home in self.homes.values():
             for row, part in home.items():
@@ -298,7 +298,7 @@ class _Reading:
     # Faults.
 
     def opens(self) -> Iterator[NetFault]:
-        """Yield the terminals in no void, and the parts of a net that are not joined to it."""
+        """Yield the terminals outside all voids, and the disconnected parts of a net."""
         for name, home in self.homes.items():
             counts = [*home.values()]
             parts = [part for part in dict.fromkeys(counts) if part is not None]
@@ -334,7 +334,7 @@ class _Reading:
         return NetFault(kind, nets, gap.index, gap.layer_indices, p, says)
 
     def shorts(self) -> Iterator[NetFault]:
-        """Yield the parts that several nets share, a fault for each further net."""
+        """Yield the parts that several nets share, with a fault for each further net."""
         for part, names in self.owners.items():
             for name in names[1:]:
                 both, says = (names[0], name), say("nets.short", net=names[0], other=name)
@@ -361,7 +361,7 @@ class _Reading:
                 yield self._fault("leak", names, self.interface(void.level), p, says)
 
     def dead_ends(self, ratio: float) -> Iterator[NetFault]:
-        """Yield the blind ends in the cavities of the nets."""
+        """Yield the dead ends in the cavities of the nets."""
         for number, cavity, gap, names in self.of_net():
             terminals = self._ways_on(number) if names else []
             if len(terminals) > 1:
@@ -374,7 +374,7 @@ class _Reading:
                 yield self._fault("dead-end", names, gap, p, say(blind, net=names[0]))
 
     def strays(self) -> Iterator[NetFault]:
-        """Yield closed voids outside all nets, and chamber interfaces' voids that open outside."""
+        """Yield closed voids outside all nets, and chamber voids that open to the outside."""
         is_open = {self.part_of[void] for void in self.graph.joins.get(OUTSIDE, {})}
         visited: set[int] = set()
         for number, cavity, gap, names in self.of_net():
@@ -388,7 +388,7 @@ class _Reading:
     # Widths and places.
 
     def narrow(self, design: Design) -> Iterator[NarrowPlace]:
-        """Yield the place of every cavity of a net that is hardest to open at worst."""
+        """Yield the place of each net cavity that is hardest to open in the worst case."""
         for _, cavity, gap, names in self.of_net():
             if names and not cavity.is_open_film:
                 edges = VoidEdges.of(gap, design)
@@ -401,7 +401,7 @@ class _Reading:
         return axis_of(self.cavities[number].region, 0.0 if width is None else width.value)
 
     def _ways_on(self, number: int) -> list[Terminal]:
-        """The ports, mouths and vias of a cavity, and the places where it reaches the outside."""
+        """Return the ports, mouths and vias of a cavity, and its openings to the outside."""
         rows = [
             Terminal(row.at, row.width, row.is_port)
             for name in self.owners.get(self.parts[number], ())
@@ -429,9 +429,9 @@ class _Reading:
         return [number for number, home in enumerate(self.parts) if home == part]
 
     def _gap_between(self, part: int, main: int) -> _Cut:
-        """The place where two parts of a net most likely should be joined.
+        """Return the most likely place of a missing connection between two parts of a net.
 
-        That is where both end one above the other, or else where they come nearest.
+        It is where both end one above the other, else where they are nearest.
         """
         cuts: list[_Cut] = []
         for a in self._of_part(part):
@@ -447,7 +447,7 @@ class _Reading:
         return min(cuts, key=lambda cut: (cut.cost, cut.interface))
 
     def _shared_mouth(self, part: int, first: str, second: str) -> tuple[int, Point, str] | None:
-        """The cavity and place of the second net, and the chamber, whose mouth alone joins both."""
+        """Return the second net's cavity and place, and the chamber whose mouth joins both nets."""
         walled = _parts(self.graph, ("outside", "mouth"))
         firsts, seconds = (
             {
@@ -467,10 +467,10 @@ class _Reading:
         return None
 
     def _bridge(self, part: int, first: str, second: str) -> tuple[int, Point]:
-        """The cavity and the place in it where two nets of one part are joined.
+        """Return the cavity and the place that connect two nets in one part.
 
-        The ways between the ports of each net are its own; the bridge is the middle of the shortest
-        way from the one's to the other's.
+        The paths between each net's own ports are excluded; the bridge is the midpoint of the
+        shortest remaining path.
         """
         numbers = self._of_part(part)
         axes = [self.axis(number) for number in numbers]
@@ -496,7 +496,7 @@ class _Reading:
     def _links(
         self, numbers: Sequence[int], axes: Sequence[VoidAxis]
     ) -> dict[AxisNode, list[AxisNode]]:
-        """The nodes on both sides of every via or mouth between these cavities."""
+        """Return the nodes on both sides of every via or mouth between these cavities."""
         links: dict[AxisNode, list[AxisNode]] = {}
         for via, voids in self.graph.joins.items():
             if via.kind not in ("opening", "mouth"):
@@ -515,9 +515,9 @@ class _Reading:
 
 
 class _Cut(NamedTuple):
-    """A gap of ``length`` mm between two parts of a net; the one of least ``cost`` is likeliest.
+    """A gap of ``length`` mm between two parts of a net; the least ``cost`` is the likeliest.
 
-    A film between two ends costs nothing, bond its length, a crossing of channels twice its width.
+    A film between ends costs nothing, a bond its length, a crossing of channels twice its width.
     """
 
     cost: float
@@ -539,7 +539,7 @@ def _nearest(a: VoidAxis, b: VoidAxis, interface: int) -> _Cut:
 
 
 def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
-    """Return the places where a film alone lies between two cavities, ends before crossings."""
+    """Return the places where only a film separates two cavities, ends before crossings."""
     lower = min(a.interface, b.interface)
     cuts = []
     for piece in without_slivers(a.region & b.region).pieces:
@@ -550,7 +550,7 @@ def _overlaps(a: Cavity, b: Cavity) -> list[_Cut]:
 
 
 def _parts(graph: VoidGraph, walls: Collection[str] = ("outside",)) -> dict[Void, int]:
-    """Return the part number of every void; walls join no parts."""
+    """Return the part number of every void; walls do not connect parts."""
     parts: dict[Void, int] = {}
     for void in [*graph.pieces, *graph.gaps, *graph.openings]:
         if void not in parts:
@@ -571,7 +571,7 @@ def _layers(gap: Interface) -> tuple[int, int]:
 
 
 def _labels(home: Mapping[_Terminal, int | None], part: int) -> list[Clause | str]:
-    """The members of a net in a part; inlet or pocket where the other of the two lies elsewhere."""
+    """Return the members of a net in a part, as inlet or pocket if the other one lies elsewhere."""
     here = [row for row, number in home.items() if number == part]
     away = {row.member for row, number in home.items() if number != part}
     return [*dict.fromkeys(row.label if row.member in away else row.member for row in here)]
@@ -580,7 +580,7 @@ def _labels(home: Mapping[_Terminal, int | None], part: int) -> list[Clause | st
 def _openings(
     narrow: Sequence[NarrowPlace], laminate: Laminate, design: Design
 ) -> Iterable[Finding]:
-    """Yield the channel that takes most pressure to open; a warning if its pressure is unknown."""
+    """Yield the channel with the highest opening pressure; a warning if the pressure is unknown."""
     limit = design.rules.channels_open_at_kpa
     modelled = [(place.pressure, place) for place in narrow if place.pressure is not None]
     if modelled:

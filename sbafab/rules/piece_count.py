@@ -1,4 +1,4 @@
-"""piece-count: each layer falls into exactly the pieces that its role asks for."""
+"""piece-count: each layer consists of the number of pieces that its role requires."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ NAME = "piece-count"
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the largest departure of a layer's number of pieces from the one it should have."""
+    """Return the largest difference between a layer's number of pieces and the required number."""
     laminate = measures.laminate
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     worst = max(laminate.layers, key=lambda layer: abs(counts[layer.pattern] - layer.pieces))

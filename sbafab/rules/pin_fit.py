@@ -1,8 +1,8 @@
-"""pin-fit: every film goes on its pins, with hole and pin at their worst.
+"""pin-fit: every film fits over its pins in the worst case of hole and pin.
 
-A cut edge lies off by up to the cutting error all round, so a hole may be two of them narrower than
-drawn, the place of its middle included. A film whose hole is then narrower than its pin must
-stretch over it. A kerf that is not compensated makes holes wider: they go on easier, and hold less.
+A cut edge deviates by up to the cutting error all around, so a hole may be narrower than drawn by
+twice that error, including its position error. A film whose hole is then narrower than its pin must
+stretch over it. An uncompensated kerf makes holes wider: they fit more easily and hold less.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ class _Fit(NamedTuple):
 
     @property
     def most(self) -> float:
-        """The pin's largest diameter."""
+        """The pin's largest diameter, mm."""
         return self.pin.diameter + pin_deviations(self.pin.diameter)[1]
 
     @property
     def stretch(self) -> float:
-        """Share by which the hole must widen; infinite if cutting may close it."""
+        """The strain of the hole over the pin; infinite if cutting may close the hole."""
         if self.least <= 0:
             return math.inf
         return max(0.0, self.most / self.least - 1)
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the largest stretch of a film over a pin, against the share that is allowed."""
+    """Return the largest strain of a film over a pin, against the allowed strain."""
     laminate, design = measures.laminate, measures.design
     limit = design.registration.pin_stretch
     fits = list(_fits(laminate, design))
@@ -79,7 +79,7 @@ RULE = Rule(NAME, check, explained(NAME), at_most=True)
 
 
 def _fits(laminate: Laminate, design: Design) -> Iterator[_Fit]:
-    """Every pin in every pattern that hangs on it in a step."""
+    """Return every pin with each pattern that hangs on it in a step."""
     visited = set()
     on_pins = error_on_pins(design, laminate)
     for step in press_steps(laminate):
@@ -100,12 +100,12 @@ def _fits(laminate: Laminate, design: Design) -> Iterator[_Fit]:
 
 
 def most_on_a_pin(laminate: Laminate) -> int:
-    """Return the greatest number of layers threaded on one pin in one step."""
+    """Return the largest number of layers threaded on one pin in one step."""
     return max((_threaded(laminate, pin) for pin in laminate.pins), default=0)
 
 
 def _threaded(laminate: Laminate, pin: Pin) -> int:
-    """Number of layers on the pin in the step that lays most of them."""
+    """Return the largest number of layers on the pin in any step."""
     counts = [
         sum(pin in laminate.pins_holding(laminate.layer(index)) for index in step.adds)
         for step in press_steps(laminate)

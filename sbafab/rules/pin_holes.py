@@ -1,4 +1,4 @@
-"""pin-holes: every pin of the plate finds its holes, and no film stands in its way."""
+"""pin-holes: every pin of the plate has its holes, and no film blocks it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def _miss(p: Point, layer: Layer | None, sentence: str, **facts: Any) -> Finding
 
 
 def _idle(laminate: Laminate) -> Iterator[Finding]:
-    """Yield the pins that no layer has a hole for."""
+    """Yield the pins for which no layer has a hole."""
     used = {pin for layer, *_ in laminate.patterns.values() for pin in laminate.pins_holding(layer)}
     for pin in laminate.pins:
         if pin not in used:
@@ -48,7 +48,7 @@ def _idle(laminate: Laminate) -> Iterator[Finding]:
 
 
 def _unholed(laminate: Laminate) -> Iterator[Finding]:
-    """Yield layers that lack a hole at a tooling pin although others of their kind have one."""
+    """Yield layers without a hole at a tooling pin for which similar layers have one."""
     for pin in tooling_pins(laminate):
         for roles in ON_ONE_PIN:
             holed: dict[bool, list[Layer]] = {True: [], False: []}
@@ -61,7 +61,7 @@ def _unholed(laminate: Laminate) -> Iterator[Finding]:
 
 
 def _loose(laminate: Laminate) -> Iterator[Finding]:
-    """Yield pieces that ears should hold, on too few pins in the step that lays them."""
+    """Yield pieces that ears should hold but that have too few pins in their laying step."""
     if laminate.registration != "ears":
         return
     masks = [layer.index for layer in laminate.layers if layer.role == "chamber-mask"]
@@ -79,7 +79,7 @@ def _loose(laminate: Laminate) -> Iterator[Finding]:
 def _blocked(laminate: Laminate) -> Iterator[Finding]:
     """Yield layers with film at a tooling pin, in a step that lays a layer on it.
 
-    The channels' pins have the channels' room, which channel-clear measures.
+    channel-clear checks the openings for channel pins.
     """
     for step in press_steps(laminate):
         added = distinct_layers(laminate, step.adds)

@@ -1,8 +1,8 @@
-"""Freedoms: the distance each layer may lie off its place once the laminate is assembled.
+"""Freedoms: the possible displacement of each layer in the finished laminate.
 
-Layers come together in the steps of the lay-up. A body is a piece of a layer, or all pieces that
-an earlier step has joined. Two pins locate a body to within the pin error and the play in its
-holes; on one pin it may also turn; a body without pins is placed by hand on the film below it.
+Layers are joined in the steps of the lay-up. A body is a piece of a layer, or all pieces that an
+earlier step has joined. Two pins locate a body to within the pin error and the play in its holes;
+on one pin it may also rotate; a body without pins is placed by hand on the film below it.
 """
 
 from __future__ import annotations
@@ -25,24 +25,24 @@ from sbafab.laminate.lay_up import LayUpStep, lay_up_steps
 
 
 def error_on_pins(design: Design, laminate: Laminate) -> float:
-    """Return the most by which a layer of a laminate lies off its place on its pins, mm."""
+    """Return the largest displacement of a layer on its pins, mm."""
     return design.pin_error if len(laminate.pins) > 1 else design.lone_pin_error
 
 
 class Part(NamedTuple):
-    """A piece of a layer: the layer's index and the piece's place in ``profile.pieces``."""
+    """A piece of a layer: the layer's index and the piece's index in ``profile.pieces``."""
 
     layer: int
     piece: int
 
 
 class Freedom(NamedTuple):
-    """One way a body may lie off its place: by up to ``most`` mm in any direction, or, given a
-    ``centre``, turned about it by up to ``most`` radians.
+    """One possible displacement of a body: up to ``most`` mm in any direction or, with a
+    ``centre``, a rotation about it of up to ``most`` radians.
 
-    The body reaches from layer ``lowest`` to ``highest``; ``body`` distinguishes it from others in
-    the same ``step``. ``pins`` are the pins that hold it. ``seam``: the name of the seam, if the
-    body is a seam's path.
+    The body extends from layer ``lowest`` to ``highest``; ``body`` distinguishes it from others in
+    the same ``step``. ``pins`` are the pins that hold it. ``seam`` is the seam's name if the body
+    is a seam's path.
     """
 
     step: int
@@ -56,14 +56,14 @@ class Freedom(NamedTuple):
 
     @property
     def by_hand(self) -> bool:
-        """True if it depends on the hand: every turn, and the place of a body without pins.
+        """True for every rotation, and for the placement of a body without pins.
 
-        A seam's place depends on its tool, as a cut edge's place depends on the laser.
+        A seam's position depends on its tool, as a cut edge's position depends on the laser.
         """
         return not self.seam and (self.centre is not None or self.pins == 0)
 
     def like(self) -> tuple[object, ...]:
-        """Equal for freedoms that differ in step and body only."""
+        """The key of freedoms that differ only in step and body."""
         centre = self.centre and (nanometres(self.centre[0]), nanometres(self.centre[1]))
         return self.most, centre, self.pins, bool(self.seam)
 
@@ -76,7 +76,7 @@ Freedoms = Mapping[Part, Ways]
 
 
 def unshared(moves: Freedoms, layers: Iterable[int]) -> list[Ways]:
-    """Freedoms of each piece of these layers, in order, without those shared by all pieces."""
+    """Return the freedoms of each piece of these layers, in order, without those shared by all."""
     parts = (takewhile(moves.__contains__, map(Part, repeat(layer), count())) for layer in layers)
     every = [moves[part] for part in chain.from_iterable(parts)]
     shared = set.intersection(*(set(map(id, ways)) for ways in every))
@@ -84,10 +84,10 @@ def unshared(moves: Freedoms, layers: Iterable[int]) -> list[Ways]:
 
 
 class Laid(NamedTuple):
-    """A body as it is laid in a step, with its play on the ``pins`` that hold it.
+    """A body as laid in a step, with its play on the ``pins`` that hold it.
 
-    A body without pins is laid on the part ``under`` it. ``centre``: the point it turns about.
-    ``stays``: no pin holds anything in this step, and it is the lowest.
+    A body without pins is laid on the part ``under`` it. ``centre`` is its point of rotation.
+    ``stays``: it is the lowest body of a step without pins.
     """
 
     body: Sequence[Part]
@@ -99,7 +99,7 @@ class Laid(NamedTuple):
 
 
 def lay_up(laminate: Laminate) -> list[Laid]:
-    """Return all bodies in the order they are laid, for any tolerances."""
+    """Return all bodies in the order of laying, for any tolerances."""
     shapes = _Shapes(laminate)
     bodies = [[part] for layer in laminate.layers for part in shapes.parts(layer.index)]
     laid: list[Laid] = []
@@ -119,10 +119,10 @@ def lay_up(laminate: Laminate) -> list[Laid]:
 
 
 def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedoms:
-    """Return the freedoms of each piece of each layer, from every step that it goes through.
+    """Return the freedoms of each piece of each layer, from all its steps.
 
-    Two pieces lie off each other by the freedoms that they do not share. ``laid`` is the result of
-    ``lay_up``.
+    The relative displacement of two pieces depends on the freedoms that they do not share. ``laid``
+    is the result of ``lay_up``.
     """
     counts = {name: len(layers[0].profile.pieces) for name, layers in laminate.patterns.items()}
     by_part: dict[Part, Ways] = {
@@ -143,14 +143,14 @@ def freedoms(laminate: Laminate, design: Design, laid: Sequence[Laid]) -> Freedo
 
 
 def seam_part(seam: Seam, piece: int = 0) -> Part:
-    """Return a seam's region as a part; its layer index is negative, so no film shares it."""
+    """Return a seam's region as a part with a negative layer index, which no film has."""
     return Part(-seam.order, piece)
 
 
 def _of_seam(
     laminate: Laminate, seam: Seam, by_part: Mapping[Part, Ways], design: Design
 ) -> dict[Part, Ways]:
-    """Freedoms of a seam: the upper film's, since its path is laid on that film, and its tool's."""
+    """Return the freedoms of a seam: its tool's, and those of the film above, its base."""
     films = laminate.layer(seam.above).profile.pieces
     under = next((n for n, film in enumerate(films) if not (film & seam.region).is_empty), 0)
     steps = (s.number for s in lay_up_steps(laminate) if s.joining and s.joining.seam is seam)
@@ -162,7 +162,7 @@ def _of_seam(
 
 
 def _body_freedoms(laid: Laid, number: int, hand: Registration, on_pins: float) -> Ways:
-    """Freedoms that a step gives a body; ``on_pins`` mm off its place on its pins."""
+    """Return the freedoms that a step gives a body, up to ``on_pins`` mm off on its pins."""
     pins = laid.pins
     shift = on_pins + min(pins.values()) if pins else hand.hand_placement
     turn, centre = math.radians(hand.hand_turn), laid.centre
@@ -178,10 +178,10 @@ def _body_freedoms(laid: Laid, number: int, hand: Registration, on_pins: float) 
 
 
 def _turn_on(pins: Mapping[Point, float]) -> tuple[float, Point]:
-    """Greatest turn (radians) that play on two or more pins allows a body, and its centre.
+    """Return the largest rotation (radians) that play on pins allows a body, and its centre.
 
-    Of all pairs the one that holds best decides; the body turns about the point between its pins
-    that their play divides.
+    The pair of pins that restrains it most decides; their play divides the distance between them at
+    the centre.
     """
     turns = []
     for (a, loose_a), (b, loose_b) in combinations(pins.items(), 2):
@@ -211,7 +211,7 @@ class _Shapes:
         return self.pieces[part.layer][part.piece]
 
     def pins(self, body: Iterable[Part], step: LayUpStep) -> dict[Point, float]:
-        """Centres of the step's pins that hold a part of the body, and its play on each, mm."""
+        """Return the centres of the step's pins that hold a part, and the play on each, mm."""
         play: dict[str, float] = {}
         for part in body if step.pins else ():
             for name, loose in self.play(self._region(part)).items():
@@ -219,7 +219,7 @@ class _Shapes:
         return {pin.centre: play[pin.name] for pin in step.pins if pin.name in play}
 
     def centre(self, body: Sequence[Part]) -> Point:
-        """The body's centre of area, all its parts counted."""
+        """Return the area centroid of all the body's parts."""
         area = x = y = 0.0
         for part in body:
             region = self._region(part)
@@ -228,7 +228,7 @@ class _Shapes:
         return x / area, y / area
 
     def under(self, body: Sequence[Part], present: Sequence[Sequence[Part]]) -> Part | None:
-        """The part that a body placed by hand lies on: the highest film of the body below."""
+        """Return the part under a body placed by hand: the highest film of the body below."""
         lowest = min(body).layer
         feet = [self._region(part) for part in body if part.layer == lowest]
         below = [(part, lower) for lower in present for part in lower if part.layer < lowest]
@@ -239,7 +239,7 @@ class _Shapes:
         return None
 
     def joined(self, present: Sequence[list[Part]]) -> list[list[Part]]:
-        """Return the bodies after a step: parts that lie on each other have become one."""
+        """Return the bodies after a step: overlapping parts are joined."""
         leader = {part: body[0] for body in present for part in body}
 
         def first(part: Part) -> Part:
@@ -260,12 +260,12 @@ class _Shapes:
 
 
 def _overlap(a: Region, b: Region) -> bool:
-    """Return True if two regions lie over each other."""
+    """Return True if two regions overlap."""
     return boxes_meet(a.bounds, b.bounds) and not (a & b).is_empty
 
 
 def _play_on_pins(laminate: Laminate, part: Region) -> dict[str, float]:
-    """The pins that hold a part, and its play on each by the drawn hole, mm."""
+    """Return the pins that hold a part, and its play on each in the drawn hole, mm."""
     circles = [hole.circle for hole in part.holes if hole.circle is not None]
     return {
         pin.name: max(

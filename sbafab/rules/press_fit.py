@@ -1,9 +1,9 @@
-"""press-fit: the laminate fits the heated area; a warning for untested heights and press minutes,
-and for a film that is not an elastomer.
+"""press-fit: the laminate fits the heated area; warns of untested heights and press minutes, and of
+a film that is not an elastomer.
 
-Heights are untested above ``validated_balloons``, or that many of the paper's films: heat takes a
-time in proportion to the height's square to a stack's middle. Minutes are untested if no kit or
-design states them for a film.
+Heights are untested above ``validated_balloons``, or above that many of the paper's films: the time
+for heat to reach a stack's middle is proportional to the square of its height. Minutes are untested
+if neither kit nor design states them for a film.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ STIFFEST = 1000.0
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the laminate's size against the platen, either way round, and the warnings."""
+    """Return the laminate's size against the platen, in either orientation, and the warnings."""
     return [_size(measures), *_warnings(measures)]
 
 

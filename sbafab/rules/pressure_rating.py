@@ -1,7 +1,7 @@
-"""pressure-rating: the estimated burst pressure is the working pressure times a safety factor.
+"""pressure-rating: the estimated burst pressure exceeds the working pressure by a safety factor.
 
-A design that states no working pressure is held against 100 kPa, at which the paper gives forces,
-and is warned; one that states it fails.
+Without a stated working pressure a design is compared with 100 kPa, at which the paper gives
+forces, and is warned at most; with one it fails.
 """
 
 from __future__ import annotations

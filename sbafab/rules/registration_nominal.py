@@ -1,4 +1,4 @@
-"""registration-nominal: as drawn, holes lie on their axes and pins, a balloon's films congruent."""
+"""registration-nominal: as drawn, holes lie on their axes and pins, and balloon films coincide."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ NAME = "registration-nominal"
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the largest departure of a hole from its axis or pin, or of an outline."""
+    """Return the largest deviation of a hole from its axis or pin, or of an outline."""
     laminate = measures.laminate
     departures = [*_off_axis(laminate), *_off_pins(laminate), *_off_outline(laminate)]
     if not departures:
@@ -36,7 +36,7 @@ RULE = Rule(NAME, check, explained(NAME), at_most=True)
 def _departure(
     off: float, layers: tuple[int, ...], p: Point, says: str, **facts: Any
 ) -> tuple[float, Finding]:
-    """Return a departure before it is rounded, and its finding."""
+    """Return a deviation before rounding, and its finding."""
     good = off <= TOLERANCE + 1e-9
     sentence = "aligned" if good else says
     facts |= {"off": max(off, 1e-6)} if good else {}
@@ -55,7 +55,7 @@ def _off_axis(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
 
 
 def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
-    """The centre of the innermost round hole about the channel's axis."""
+    """Return the centre of the innermost round hole about the channel's axis."""
     round_ones = [
         hole.circle
         for hole in layer.profile.holes
@@ -65,7 +65,7 @@ def _opening_centre(layer: Layer, channel: Channel) -> Point | None:
 
 
 def _off_pins(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
-    """Tooling holes off their pin; one that a layer lacks is off by the pin's diameter."""
+    """Return tooling holes and their offset from the pin; a missing hole counts as its diameter."""
     for pin in tooling_pins(laminate):
         # The nearest round hole, at most the pin's diameter away.
         off = {
@@ -102,7 +102,7 @@ def _off_outline(laminate: Laminate) -> Iterator[tuple[float, Finding]]:
 
 @cached
 def _farthest(region: Region, target: Region) -> tuple[float, Point]:
-    """Greatest distance of a region's edges (ends and middles) from ``target``, and where."""
+    """Return the largest distance of a region's edge points from ``target``, and where."""
     return max(
         (
             (target.index.distance(p), p)

@@ -1,8 +1,8 @@
 """registration-worst-case: bond and overhang that remain with every error at its worst.
 
-Cut edges lie off by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
-without pins by the hand's placement and turn, and seams by their tool's error of place. A seam's
-width is taken to be as exact as a cut edge; it does not count at overlaps of seams.
+Cut edges deviate by the cutting error, layers on pins by the pin error (paper Sec. 2), layers
+without pins by the placement and rotation of the hand, and seams by their tool's position error. A
+seam's width is assumed to be as accurate as a cut edge; it does not count at overlaps of seams.
 """
 
 from __future__ import annotations
@@ -34,9 +34,9 @@ SAME = 1e-8
 class Remaining(NamedTuple):
     """Width that remains at the worst margin of an interface, mm; it may be negative.
 
-    ``pinned`` is the least that remains anywhere in it without the errors of the hand. Places that
-    are short as drawn do not count for it: bond-width and mask-overhang report those. ``number`` is
-    the column of the worst among the ``margins`` between the same owners.
+    ``pinned`` is the least width that remains in the interface without hand errors. It excludes
+    places that are short as drawn, which bond-width and mask-overhang report. ``number`` is the
+    column of the worst of the ``margins`` between the same owners.
     """
 
     worst: float
@@ -58,12 +58,12 @@ class Remaining(NamedTuple):
 
     @property
     def is_overlap(self) -> bool:
-        """True if it is the depth by which a seam runs into another one."""
+        """True for the depth of an overlap of two seams."""
         return not self.margins.cut_edges
 
     @property
     def dearest(self) -> list[tuple[Freedom, float]]:
-        """The bodies that can move, with the mm that shift and turn take together, most first."""
+        """The bodies that can move, and the mm lost by their shift and rotation, largest first."""
         total: dict[tuple[int, int], tuple[Freedom, float]] = {}
         costs = self.margins.costs[:, self.number].tolist()
         for (freedom, _), cost in zip(self.margins.moves, costs, strict=True):
@@ -102,7 +102,7 @@ def _least(run: Sequence[Margins], design: Design) -> Remaining:
 
 
 def check(measures: Measures) -> list[Finding]:
-    """The least remaining bond and overhang, each with its place and largest contribution."""
+    """Return the least remaining bond and overhang, with their places and largest contributions."""
     design, remaining = measures.design, least_remaining(measures)
     bond = _finding("bond", design.rules.worst_bond_width, remaining, measures)
     overhang = _finding("overhang", design.rules.worst_mask_overhang, remaining, measures)
@@ -192,7 +192,7 @@ def _what(worst: Remaining) -> Clause:
 
 
 def _at_edge(bond: EdgeBond, design: Design) -> Finding:
-    """The finding of a seam that may end too near to the edge of a film, or short of it."""
+    """Return the finding of a seam that may end too near the edge of a film, or short of it."""
     interface, seam, limit = bond.interface, bond.seam, design.rules.worst_bond_width
     facts = {
         "error": design.registration.error_of_seam(seam.tool),
@@ -205,13 +205,13 @@ def _at_edge(bond: EdgeBond, design: Design) -> Finding:
 
 
 def _moved(freedom: Freedom) -> Clause:
-    """Return the layers of a freedom."""
+    """Return the layers that a freedom moves."""
     sentence = "layer" if freedom.lowest == freedom.highest else "layers"
     return say(f"{NAME}.{sentence}", lowest=freedom.lowest, highest=freedom.highest)
 
 
 def _source(freedom: Freedom) -> Clause:
-    """Return a displacement: its cause, its layers and its press step."""
+    """Return the source of a displacement: its cause, its layers and its press step."""
     if freedom.seam:
         return say(f"{NAME}.seam", seam_name=freedom.seam)
     cause = {0: "hand", 1: "turn"}.get(freedom.pins, "play")
@@ -221,7 +221,7 @@ def _source(freedom: Freedom) -> Clause:
 def _advice(
     quantity: MarginKind, dearest: Iterable[tuple[Freedom, float]], laminate: Laminate
 ) -> Clause:
-    """Return the remedy for the hand's errors."""
+    """Return the remedy for hand-placement errors."""
     wider = say(f"{NAME}.wider-{quantity}")
     loose = next((freedom for freedom, _ in dearest if freedom.pins < 2 and not freedom.seam), None)
     if loose is None:

@@ -1,7 +1,7 @@
 """registration-yield: the share of random builds in which every interface keeps its limits.
 
-Monte Carlo with a fixed seed. The paper gives only the largest errors, so the distributions are
-assumed: every cutting error and turn uniform within its most, every shift uniform over a disc.
+Monte Carlo with a fixed seed. The paper gives only maximum errors; assumed are a uniform cutting
+error and rotation up to the maximum, and a shift uniform over a disc.
 
 Each error has a row of random numbers a batch (a shift has two).
 """
@@ -49,7 +49,7 @@ ROUNDING = 1e-9
 
 
 class Share(NamedTuple):
-    """``good`` of ``builds``, with the Wilson interval of 95 %."""
+    """The number ``good`` of ``builds``, with the 95 % Wilson interval of the share."""
 
     good: int
     builds: int
@@ -61,7 +61,7 @@ class Share(NamedTuple):
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval of 95 % of the share."""
+        """The 95 % Wilson interval of the share."""
         n, p, z = self.builds, self.value, Z95
         middle = (p + z * z / (2 * n)) / (1 + z * z / n)
         half = z * math.sqrt(p * (1 - p) / n + z * z / (4 * n * n)) / (1 + z * z / n)
@@ -69,14 +69,14 @@ class Share(NamedTuple):
 
 
 class Yield(NamedTuple):
-    """Shares of good builds: of all interfaces together, and of each (by index)."""
+    """Shares of good builds: for all interfaces together, and for each (by index)."""
 
     whole: Share
     interfaces: dict[int, Share]
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the share of good builds, against ``target_yield`` if the design sets one."""
+    """Return the share of good builds, compared with ``target_yield`` if the design sets one."""
     laminate, design = measures.laminate, measures.design
     return [finding_of(simulate(laminate, design, SEED, measures), laminate, design)]
 
@@ -117,7 +117,7 @@ def finding_of(outcome: Yield, laminate: Laminate, design: Design) -> Finding:
 
 
 def _losing(shares: Mapping[int, Share], order: Sequence[int]) -> Clause:
-    """Return the interfaces that are not always good, with the least shares."""
+    """Return the interfaces that lose builds, with the lowest shares."""
     if not order:
         return say(f"{NAME}.no-losing")
     first = ", ".join(f"{i} {shares[i].value:.2%}" for i in order[:3])
@@ -137,7 +137,7 @@ Error = CutContour | Freedom
 class ShortMargins(NamedTuple):
     """Margins between two contours that can fall short, by their ``room`` beyond the limit, mm.
 
-    They depend on ``errors``: the two contours, which count by their ``signs``, then the moves.
+    They depend on ``errors``: first the two contours, with their ``signs``, then the moves.
     """
 
     margins: Margins
@@ -147,7 +147,7 @@ class ShortMargins(NamedTuple):
 
 
 def short_margins(margins: Margins, design: Design) -> ShortMargins | None:
-    """Return the margins that can fall short with every error at its worst; None if none can."""
+    """Return the margins that fall short with every error at its worst; None if there are none."""
     rules, is_bond, places = design.rules, margins.quantity == "bond", margins.places
     room = places.nominal - (rules.worst_bond_width if is_bond else rules.worst_mask_overhang)
     cut = margins.cut_edges * design.registration.cutting_error
@@ -170,10 +170,10 @@ def short_margins(margins: Margins, design: Design) -> ShortMargins | None:
 def short_builds(
     short: ShortMargins, first: Indices, cutting: float, numbers: Floats
 ) -> tuple[Indices, Indices]:
-    """Return in which interfaces and builds one of the margins comes short.
+    """Return the interfaces and builds in which one of the margins falls short.
 
-    ``first`` are the numbers of the first row of each error, a column for each interface;
-    ``numbers`` are from 0 to 1, a row for each error and a column for each build.
+    ``first`` are the numbers of the first row of each error, one column for each interface;
+    ``numbers`` are from 0 to 1, one row for each error and one column for each build.
     """
     margins, room, _, signs = short
     moves = list(zip(margins.moves, margins.levers, first[2:], strict=True))
@@ -251,8 +251,8 @@ def simulate(
 
 
 def _drawn(measures: Measures) -> tuple[list[tuple[ShortMargins, Indices]], int]:
-    """Return all margins that can fall short with the first rows of their errors, a column for
-    each interface, and the number of rows.
+    """Return all margins that can fall short, the first rows of their errors (one column per
+    interface) and the number of rows.
 
     Errors are drawn in the order of the first margin that they narrow, interface by interface.
     """
@@ -281,7 +281,7 @@ def _drawn(measures: Measures) -> tuple[list[tuple[ShortMargins, Indices]], int]
 
 
 def _precise_number(share: Share) -> int:
-    """Builds that make the interval of a share narrow: as many, or whole batches up to 40,000."""
+    """Return enough builds for a narrow interval: the given number, or batches up to 40,000."""
     low, high = share.interval
     # A half scatters most: of all shares in the interval the one nearest to it.
     worst = min(max(0.5, low), high)
@@ -292,7 +292,7 @@ def _precise_number(share: Share) -> int:
 def _renamed(
     errors: list[Error], first: Interface, target: Interface, moves: Freedoms
 ) -> list[Error]:
-    """Errors of ``target`` that correspond to the errors of an equal interface."""
+    """Return the errors of ``target`` that correspond to those of an equal interface."""
     if target is first:
         return errors
     from_layers, to_layers = seated(first), seated(target)

@@ -17,7 +17,7 @@ __all__ = ["Explanation", "Rule"]
 class Rule(NamedTuple):
     """A rule: its stable name, the function that checks it, and its explanation.
 
-    ``at_most``: its limit is the largest value allowed; of all others it is the least.
+    ``at_most``: its limit is the largest value allowed, otherwise the least.
     """
 
     name: str

@@ -1,6 +1,6 @@
-"""sealing: every inlet feeds the pockets of its own chamber, all of them, and nothing else.
+"""sealing: every inlet feeds all pockets of its own chamber and nothing else.
 
-Also, no balloon lies loose on the film below it. The voids of the laminate form a graph, which is
+Also, every balloon is bonded to the film below it. The voids of the laminate form a graph, which is
 searched from each inlet.
 """
 
@@ -37,8 +37,9 @@ CUT = 1e-4
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the number of pockets that leak, reach another, are cut off or missing, and of loose
-    films. If nets are declared, the rule nets judges how voids join.
+    """Return the number of pockets that leak, meet another or are cut off, and loose films.
+
+    If nets are declared, the rule nets judges how voids connect.
     """
     laminate, offences, count = measures.laminate, _loose_films(measures.laminate), 0
     if not laminate.nets:
@@ -66,7 +67,7 @@ def _offence(sentence: str, interface: Interface | None, at: Point | None, **fac
 
 
 class _Pockets(NamedTuple):
-    """The void graph of a laminate, and the chambers that each pocket of it belongs to."""
+    """The void graph of a laminate, and the chambers that each pocket belongs to."""
 
     laminate: Laminate
     graph: VoidGraph
@@ -92,9 +93,9 @@ class _Pockets(NamedTuple):
         return pockets
 
     def leave_to_innermost(self, level: int) -> None:
-        """Assign chambers between seams to the pocket inside; the void outside all is a flap.
+        """Assign chambers between seams to the inner pocket; the void outside all is a flap.
 
-        A closed seam divides the films round it into a pocket and a flap that holds no pressure.
+        A closed seam divides the films around it into a pocket and a flap that holds no pressure.
         """
         pieces, owners = self.graph.pieces, self.owners
         taken: set[Point] = set()
@@ -113,7 +114,7 @@ class _Pockets(NamedTuple):
                 del owners[void]
 
     def missing(self) -> Iterator[Finding]:
-        """Yield the centres of chambers without a pocket in a balloon."""
+        """Yield the centres of chambers that lack a pocket in a balloon."""
         pockets: dict[tuple[int, str], list[Region]] = {}
         for void, names in self.owners.items():
             for name in names:
@@ -130,7 +131,7 @@ class _Pockets(NamedTuple):
             yield _offence("levels", None, None, levels=count, balloons=balloons)
 
     def wrong(self) -> list[Finding]:
-        """Return the pockets that leak, reach another chamber's, or are cut off."""
+        """Return the pockets that leak, reach another chamber, or are cut off."""
         laminate, graph, owners = self.laminate, self.graph, self.owners
         offences: dict[Void, Finding] = {}
         fed: set[Void] = set()
@@ -168,7 +169,7 @@ class _Pockets(NamedTuple):
         return _offence("foreign", interface, p, inlet=inlet, whose=whose or "no chamber")
 
     def leak(self, chamber: str, came: dict[Void, Void | None]) -> tuple[Void, Finding]:
-        """Pocket at which the path to the outside starts, and the fault where it leaves."""
+        """Return the pocket at which the path to the outside starts, and the fault at its exit."""
         path = [OUTSIDE]
         while (before := came[path[-1]]) is not None:
             path.append(before)
@@ -195,7 +196,7 @@ class _Pockets(NamedTuple):
         return pocket, _offence(sentence, interface, p, **facts)
 
     def closing(self, design: Design) -> Iterator[Finding]:
-        """Yield a place of each pocket between seams that parts it if these lie off their paths."""
+        """Yield a place of each pocket between seams that closes if they leave their paths."""
         for void, names in self.owners.items():
             interface, region = self.laminate.interfaces[void.level - 1], self.graph.pieces[void]
             edges = VoidEdges.of(interface, design)
@@ -224,7 +225,7 @@ def _holds(piece: Region, p: Point) -> bool:
 
 
 def _parts(region: Region, place: Width, inside: Sequence[Point]) -> bool:
-    """Return True if points of a void lie on both sides of a place across it."""
+    """Return True if points of a void lie on both sides of a cut across it."""
     (x, y), (u, v) = place.start, place.end
     dx, dy = (CUT * (u - x) / place.value, CUT * (v - y) / place.value)
     cut = strip((x - dx, y - dy), (u + dx, v + dy), CUT)
@@ -238,7 +239,7 @@ def _parts(region: Region, place: Width, inside: Sequence[Point]) -> bool:
 
 
 def _loose_films(laminate: Laminate) -> list[Finding]:
-    """Pieces of film that nothing bonds to the balloon or sheet below."""
+    """Return pieces of film without a bond to the balloon or sheet below."""
     offences = []
     for distinct in distinct_interfaces(laminate):
         gap = distinct.interface
@@ -252,5 +253,5 @@ def _loose_films(laminate: Laminate) -> list[Finding]:
 
 
 def _seamed(sentence: str, interface: Interface) -> str:
-    """Return the sentence for an interface that seams alone bond."""
+    """Return the sentence for an interface that only seams bond."""
     return f"{sentence}-seamed" if interface.seams and not interface.pressed else sentence

@@ -1,9 +1,9 @@
-"""Overlaps of seams: one ends on another or past the edge of a film, and separates two voids.
+"""Overlaps of seams: a seam ends on another or past the edge of a film, and separates two voids.
 
-Each seam lies off its path as a whole. Two seams surely meet if, in every direction, one must move
-farther than the sum of both errors to leave the other. The test takes two seams at a time, so the
-number of seams and their order do not matter. A seam that runs past the edge of a
-film bonds it along that edge, less of it the nearer its end comes.
+Each seam is displaced as a whole. Two seams are sure to meet if, in every direction, separation
+takes a displacement larger than the sum of both errors. The test takes two seams at a time, so the
+number of seams and their order do not matter. A seam that runs past the edge of a film bonds along
+that edge, over less length the nearer its end is.
 """
 
 from __future__ import annotations
@@ -33,10 +33,10 @@ ToolError = Callable[[SeamTool], float]
 
 
 class Overlap(NamedTuple):
-    """An overlap of two seams, by their places among the interface's.
+    """An overlap of two seams, by their numbers in the interface.
 
-    They separate once the ``seam`` has moved by ``depth``, mm, along the unit vector ``way``; no
-    shorter move in any direction separates them.
+    They separate if ``seam`` moves by ``depth`` mm along the unit vector ``way``; no shorter
+    displacement separates them.
     """
 
     seam: int
@@ -47,7 +47,7 @@ class Overlap(NamedTuple):
 
 
 class EdgeBond(NamedTuple):
-    """The bond of a seam that runs past a film's edge: ``width`` along the edge at worst, mm."""
+    """The bond of a seam that runs past a film's edge: worst-case ``width`` along the edge, mm."""
 
     interface: Interface
     seam: Seam
@@ -56,7 +56,7 @@ class EdgeBond(NamedTuple):
 
 
 class SeamEnds(NamedTuple):
-    """Ends of an interface's seams, on each other or on edges, that separate two voids."""
+    """Ends of an interface's seams, on other seams or on edges, that separate two voids."""
 
     overlaps: Sequence[Overlap] = ()
     edges: Sequence[EdgeBond] = ()
@@ -88,10 +88,10 @@ def seam_ends(
 
 
 class _Seams(NamedTuple):
-    """The seams of an interface that is bonded by them alone, and the voids between them.
+    """The seams of an interface bonded by seams only, and the voids between them.
 
-    ``cavities`` by name: those open to the outside share one, unless they are at an inlet; ``rim``:
-    the outer edges of the contact, except folds.
+    ``cavities`` by name: those open to the outside share one name, unless they are at an inlet;
+    ``rim``: the outer edges of the contact, except folds.
     """
 
     gap: Interface
@@ -137,10 +137,10 @@ class _Seams(NamedTuple):
                 yield EdgeBond(self.gap, seam, width, middle(piece))
 
     def _is_needed(self, overlap: Region, seams: Sequence[Seam]) -> bool:
-        """Return True if two voids are joined when these seams no longer meet there.
+        """Return True if two voids are joined once these seams no longer meet there.
 
-        They are not if further seams, shrunk by their errors of place and those of ``seams``, cover
-        the overlap.
+        They stay separate if other seams, reduced by their position errors and those of ``seams``,
+        cover the overlap.
         """
         further = [
             seam
@@ -162,7 +162,7 @@ class _Seams(NamedTuple):
 
 
 def _depth(seam: Seam, body: Region, piece: Region, reach: float) -> tuple[float, Point]:
-    """Shortest way, mm and unit vector, by which a seam leaves a body that it meets in a piece.
+    """Return the shortest move (mm, unit vector) of a seam off a body that it meets in a piece.
 
     Path parts farther than ``reach`` from the piece are ignored: a depth beyond ``reach`` remains
     at least ``reach``.
@@ -179,9 +179,9 @@ def _depth(seam: Seam, body: Region, piece: Region, reach: float) -> tuple[float
 
 
 def _edges_near(piece: Region, seam: Seam, reach: float) -> list[Edge]:
-    """The parts of a seam's path whose swath lies within ``reach`` of a piece of it.
+    """Return the parts of a seam's path whose swath lies within ``reach`` of a piece of it.
 
-    A roller's seam is as wide as its path is long, but for half the width at each end.
+    The length of a roller's seam counts, except half its width at each end.
     """
     chains = seam.path
     if seam.tool == "roller":
@@ -198,7 +198,7 @@ def _edges_near(piece: Region, seam: Seam, reach: float) -> list[Edge]:
 
 
 def _short_parts(edge: Edge) -> Iterator[Edge]:
-    """Yield arcs in parts, since dragging a region along a long arc is slow."""
+    """Yield arcs in short parts, since sweeping a region along a long arc is slow."""
     count = math.ceil(abs(edge.sweep) / PART) if isinstance(edge, Arc) else 1
     for k in range(count):
         yield edge.part(edge.at(k / count), edge.at((k + 1) / count))

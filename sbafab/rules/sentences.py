@@ -1,6 +1,6 @@
-"""What rules and checks say, by the ids of the catalogue, and how it is told.
+"""Messages of rules and checks, by their catalogue ids, and their text.
 
-A finding holds the id of its sentence and the facts that fill it; nothing but a reader reads it.
+A finding holds the id of its sentence and the facts that fill it; only readers use the text.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Explanation(NamedTuple):
     """The condition that ``holds`` if a rule passes, ``why`` it matters, how to ``mend`` it.
 
     ``keys`` of a design file set the limit or the measured value. ``at_most``: the limit of a check
-    is the largest value allowed; of a rule its ``Rule`` says it.
+    is the largest value allowed; a rule states this in its ``Rule``.
     """
 
     holds: str
@@ -34,10 +34,7 @@ class Explanation(NamedTuple):
 
 
 class Clause(NamedTuple):
-    """A sentence or a part of one: its id, "rule.sentence", and the facts that fill it, by name.
-
-    A fact is a number, a text, a point (x, y), another clause, or several texts or clauses.
-    """
+    """A sentence or part of one: its id, "rule.sentence", and the facts that fill it, by name."""
 
     id: str
     facts: tuple[tuple[str, Any], ...] = ()
@@ -46,7 +43,7 @@ class Clause(NamedTuple):
         return tell(self, {})
 
     def also(self, **facts: Any) -> Clause:
-        """Return the clause with further facts, or other ones by the same names."""
+        """Return the clause with facts added or replaced."""
         return say(self.id, **{**dict(self.facts), **facts})
 
 
@@ -58,7 +55,7 @@ def explained(name: str) -> Explanation:
 
 
 def is_said(sentence: str) -> bool:
-    """Return True if the catalogue has a sentence."""
+    """Return True if the catalogue has the sentence."""
     rule, name = sentence.split(".")
     return name in catalogue()[rule]["says"]
 
@@ -74,19 +71,19 @@ def layer_name(layer: Layer) -> Clause:
 
 
 def tell(clause: Clause, outer: Mapping[str, Any]) -> str:
-    """Return the text of a clause; facts that it lacks are those of the sentence it stands in."""
+    """Return the text of a clause; missing facts come from the enclosing sentence."""
     rule, name = clause.id.split(".")
     text: str = catalogue()[rule]["says"][name]
     return _Teller(rule).vformat(text, (), {**outer, **dict(clause.facts)}) if "{" in text else text
 
 
 def at(p: Point) -> str:
-    """Return a point as messages print it."""
+    """Return a point in the format of messages."""
     return f"x {round(p[0], 3) + 0.0:.3f}, y {round(p[1], 3) + 0.0:.3f}"
 
 
 class _Teller(string.Formatter):
-    """Fills a sentence of a rule with facts, with other sentences of the rule, and with words."""
+    """Fills a sentence of a rule with facts, other sentences of the rule, and words."""
 
     def __init__(self, rule: str) -> None:
         self.rule = rule

@@ -1,16 +1,17 @@
-"""tube-fit: the flat inlet strip, as cut at worst, opens to the tube, inside bonded film.
+"""tube-fit: the flat inlet strip opens to the tube in the worst case of cutting, within bonded
+film.
 
-A channel w wide opens to a perimeter of 2 w. In it lie the tube and, along one side of it, the PTFE
-strip: the tube's half circle there is one strip's thickness farther out, so w must be pi / 2 times
-the sum of the tube's diameter and the strip's thickness. Films t thick that do not stretch, bent
-sharply at both edges of the channel and back round the tube, would take (pi - 2) t more: 3 % for
-the paper's film, 7 % for one of 0.1 mm. An elastomer stretches by that, and it is not counted. Both
-edges of the strip may be cut off by the cutting error, and a kerf that is not compensated makes it
-narrower by its width. Between two seams it is narrower by their errors of place; a failure by these
-alone is a warning.
+A channel w wide opens to a perimeter of 2 w. It contains the tube and, along one side of it, the
+PTFE strip: the tube's half circle is larger by the strip's thickness there, so w must be pi / 2
+times the sum of the tube's diameter and the strip's thickness. Inextensible films of thickness t,
+bent sharply at both edges of the channel and back around the tube, would need (pi - 2) t more: 3 %
+for the paper's film, 7 % for one of 0.1 mm. An elastomer stretches by that, so it is neglected.
+Both edges of the strip may deviate by the cutting error, and an uncompensated kerf makes it
+narrower by its width. Between two seams it is narrower by their position errors; a failure due to
+these alone is a warning.
 
-A port that is a hole has its tube glued on the film round it: the tube must cover the hole as cut
-at its widest, and the film go on past the hole for a bond's width.
+A tube at a port hole is glued to the surrounding film: the tube must cover the hole at its widest,
+and the film must extend past the hole by a bond width.
 """
 
 from __future__ import annotations
@@ -41,9 +42,9 @@ UNLIKE = 2 * PAST_MOUTH
 
 
 class _Fit(NamedTuple):
-    """One measure of an inlet: mouth, strip or bond, its value at worst and its least value, mm.
+    """A measure of an inlet (mouth, strip or bond): its worst-case and required values, mm.
 
-    ``drawn`` is the width as drawn; ``firm`` the width left at worst with seams on their paths.
+    ``drawn`` is the drawn width; ``firm`` the worst-case width with seams on their paths.
     """
 
     inlet: Inlet
@@ -61,7 +62,7 @@ class _Fit(NamedTuple):
 
 
 def check(measures: Measures) -> list[Finding]:
-    """Return the least width of strips and of their bonds, and tubes on holes of films."""
+    """Return the least width of strips and their bonds, and the fit of tubes on film holes."""
     laminate, design = measures.laminate, measures.design
     fits = [fit for inlet in laminate.inlets for fit in _fits(inlet, laminate, design)]
     on_holes = [fit for port in laminate.tube_holes for fit in _on_hole(port, laminate, design)]
@@ -105,7 +106,7 @@ def _of_inlets(fits: Sequence[_Fit], design: Design) -> Finding:
 
 
 def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
-    """Yield a warning for each mouth that is drawn with another width than its inlet states."""
+    """Yield a warning for each mouth whose drawn width differs from the inlet's stated width."""
     for fit in fits:
         stated, gap = fit.inlet.width, fit.interface
         if fit.feature == "mouth" and gap is not None and abs(fit.drawn - stated) > UNLIKE:
@@ -117,9 +118,9 @@ def _unlike(fits: Sequence[_Fit]) -> Iterator[Finding]:
 
 
 def _on_hole(port: Port, laminate: Laminate, design: Design) -> Iterator[Finding]:
-    """Yield the tube's overlap round the hole, and the width of film round it.
+    """Yield the tube's overlap around the hole, and the width of film around it.
 
-    Both are measured from the port's place, where the tube's middle is glued.
+    Both are measured from the port's position, the centre of the glued tube.
     """
     ends = {layer.index: layer for layer in (laminate.tpe_layers[0], laminate.tpe_layers[-1])}
     beside = [ends[index] for index in (port.below, port.above) if index in ends]
@@ -214,7 +215,7 @@ def _at_worst(
     ends: Sequence[Point],
     design: Design,
 ) -> _Fit:
-    """Return the width between two points of a strip's edges that is left at worst."""
+    """Return the worst-case width between two points of a strip's edges."""
     drawn, edges = Width(math.dist(*ends), *ends), VoidEdges.of(interface, design)
     thickness = max((mask.film.thickness for mask in interface.masks), default=0.0)
     needed = math.pi / 2 * (inlet.tube_diameter + thickness)

@@ -1,8 +1,8 @@
-"""Medial axes of voids seen from above: blind ends, and the way from one place to another.
+"""Medial axes of voids seen from above: dead ends, and the path from one place to another.
 
 A void's boundary is sampled; every sample touches the largest circle inside the void that is
 tangent there, and the circle touches a second sample, its partner (shrinking balls: Ma, Bae and
-Choi, The Visual Computer 28 (2012) 7). The chord between the two is a cut straight across the void.
+Choi, The Visual Computer 28 (2012) 7). The chord between the two is a straight cut across the void.
 """
 
 from __future__ import annotations
@@ -46,11 +46,11 @@ NUDGE = 1e-3
 
 @dataclass(frozen=True)
 class VoidAxis:
-    """Samples of a void's boundary in order, contour by contour, the void on their left.
+    """Samples of a void's boundary in order, contour by contour, with the void on their left.
 
-    ``points`` and ``centres`` of the tangent circles are x + iy in mm, ``radii`` in mm;
-    ``partners`` are the samples that the circles touch besides; ``contours`` number the contour of
-    each; ``starts`` are the first samples of the contours, and their end.
+    ``points`` and the ``centres`` of the tangent circles are x + iy in mm, ``radii`` in mm;
+    ``partners`` are the other samples that the circles touch; ``contours`` numbers the contour of
+    each; ``starts`` are the first samples of the contours, then the number of samples.
     """
 
     region: Region
@@ -66,7 +66,7 @@ class VoidAxis:
         return int(np.abs(self.centres - complex(*p)).argmin())
 
     def neighbours(self, sample: int) -> tuple[int, int, int]:
-        """Return the samples before and after on the contour, and the partner."""
+        """Return the previous and next sample on the contour, and the partner."""
         contour = int(self.contours[sample])
         first, end = self.starts[contour], self.starts[contour + 1]
         before = sample - 1 if sample > first else end - 1
@@ -78,7 +78,7 @@ class VoidAxis:
 
     @cached_property
     def following(self) -> Complex:
-        """The sample after each one on its contour."""
+        """Return the next sample of each on its contour."""
         following = np.roll(self.points, -1)
         for first, end in pairwise(self.starts):
             following[end - 1] = self.points[first]
@@ -118,7 +118,7 @@ def axis_of(region: Region, width: float) -> VoidAxis:
 
 
 def _samples(contour: Contour, step: float) -> Iterator[tuple[complex, complex]]:
-    """Points inside the edges, at most a step apart, with their normals into the region."""
+    """Return points inside the edges, at most one step apart, and their normals into the region."""
     for edge in contour.edges:
         count = max(1, math.ceil(edge.length / step))
         for i in range(count):
@@ -149,7 +149,7 @@ def _circles(points: Complex, normals: Complex) -> tuple[Floats, Counts]:
 
 
 class Terminal(NamedTuple):
-    """A place that continues a void: a port, or a way of ``width`` mm out of it."""
+    """A place where a void continues: a port, or an exit of ``width`` mm."""
 
     at: Point
     width: float
@@ -157,7 +157,7 @@ class Terminal(NamedTuple):
 
 
 class BlindEnd(NamedTuple):
-    """A part of a void behind a cut of ``width`` mm, ``depth`` mm long, with its far end ``at``."""
+    """A part of a void behind a cut of ``width`` mm: ``depth`` mm long, its far end at ``at``."""
 
     at: Point
     width: float
@@ -165,11 +165,11 @@ class BlindEnd(NamedTuple):
 
 
 def blind_ends(axis: VoidAxis, terminals: Sequence[Terminal], ratio: float) -> list[BlindEnd]:
-    """Return the parts of a void that end blind, more than ``ratio`` times as long as wide.
+    """Return the dead ends of a void that are more than ``ratio`` times as long as wide.
 
-    Such a part lies behind a cut straight across the void and holds no terminal. It does not count
-    if a port lies at its foot, within the width of the cut, or if it belongs to a pocket that holds
-    a port. Length is half of the boundary round it, less the cut.
+    A dead end lies behind a straight cut across the void and holds no terminal. It is excused if a
+    port lies at its foot, within the width of the cut, or if it belongs to a pocket with a port.
+    Its length is half the boundary around it, less the cut.
     """
     cuts = _cuts(axis)
     closed = ~_holds_any(axis, cuts, [terminal.at for terminal in terminals])
@@ -196,7 +196,7 @@ def blind_ends(axis: VoidAxis, terminals: Sequence[Terminal], ratio: float) -> l
 
 
 class _Cuts(NamedTuple):
-    """Cuts across a void: the samples from ``first`` on to ``last`` lie behind it."""
+    """Cuts across a void: the samples from ``first`` to ``last`` lie behind each."""
 
     first: Counts
     last: Counts
@@ -205,7 +205,7 @@ class _Cuts(NamedTuple):
 
 
 def _cuts(axis: VoidAxis) -> _Cuts:
-    """Return both sides of every chord that parts the void."""
+    """Return both sides of every chord that divides the void."""
     samples = np.arange(len(axis.points))
     is_whole = (axis.contours[axis.partners] == axis.contours) & (axis.radii > 0)
     there, back = samples[is_whole], axis.partners[is_whole]
@@ -220,7 +220,7 @@ def _cuts(axis: VoidAxis) -> _Cuts:
 
 
 def _holds_any(axis: VoidAxis, cuts: _Cuts, places: Sequence[Point]) -> NDArray[np.bool_]:
-    """Return True for the cuts that have one of the places behind them, or on their edge."""
+    """Return True for cuts with one of the places behind them or on their edge."""
     holds = np.zeros(len(cuts.first), dtype=np.bool_)
     for p in (complex(*place) for place in places):
         # A place may lie on the boundary: a little inward.
@@ -240,7 +240,7 @@ def _within(arc: tuple[int, int, int], place: tuple[int, int], axis: VoidAxis) -
 
 
 def _is_excused(axis: VoidAxis, foot: Point, width: float, terminals: Sequence[Terminal]) -> bool:
-    """Return True if a port lies at the foot of a blind part, or in the same pocket."""
+    """Return True if a port lies at the foot of a dead end, or in the same pocket."""
     ports = [terminal for terminal in terminals if terminal.is_port]
     if any(math.dist(port.at, foot) <= width for port in ports):
         return True
@@ -273,7 +273,7 @@ Links = Mapping[AxisNode, Sequence[AxisNode]]
 def shortest_way(
     axes: Sequence[VoidAxis], links: Links, starts: Iterable[AxisNode], goals: Iterable[AxisNode]
 ) -> list[AxisNode]:
-    """Return the nodes of the shortest way from any start to any goal; empty if there is none."""
+    """Return the nodes of the shortest path from any start to any goal; empty if there is none."""
     aims = set(goals)
     lengths = dict.fromkeys(starts, 0.0)
     came: dict[AxisNode, AxisNode] = {}

@@ -1,8 +1,8 @@
-"""Voids of a laminate as a graph of the paths that air takes.
+"""Voids of a laminate as a graph of air paths.
 
 Nodes are the connected pieces of unbonded film in each interface, the places in each interface
-where one of the films is missing, the openings of each film, and the outside. The masks seal
-nothing and are not part of it.
+where one film is missing, the openings of each film, and the outside. Masks seal nothing and are
+not part of it.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ VoidKind = Literal["outside", "pocket", "separator", "gap", "opening", "mouth"]
 class Void(NamedTuple):
     """A node: ``level`` is an interface's index, or a layer's for an opening.
 
-    The ``level`` of a mouth is its inlet's place in ``laminate.inlets``.
+    The ``level`` of a mouth is its inlet's index in ``laminate.inlets``.
     """
 
     kind: VoidKind
@@ -48,7 +48,7 @@ OUTSIDE = Void("outside")
 
 @dataclass
 class VoidGraph:
-    """Voids, the points at which they join, and the openings that tubes fill."""
+    """Voids, the points at which they connect, and the openings that tubes fill."""
 
     pieces: dict[Void, Region] = field(default_factory=dict)
     """The unbonded pieces of every interface."""
@@ -67,9 +67,9 @@ class VoidGraph:
     def reached(
         self, starts: Iterable[Void], walls: Collection[str] = ("outside",)
     ) -> dict[Void, Void | None]:
-        """Return every void joined to ``starts`` with its predecessor, nearest first.
+        """Return every void connected to ``starts`` with its predecessor, nearest first.
 
-        Voids of the kinds that are ``walls`` are entered but not passed through.
+        The search enters voids of the ``walls`` kinds but does not pass through them.
         """
         came: dict[Void, Void | None] = dict.fromkeys(starts)
         queue = deque(came)
@@ -85,7 +85,7 @@ class VoidGraph:
 
 
 class _Gap(NamedTuple):
-    """Contribution of an interface, by its shapes: pieces by number, joins between them."""
+    """An interface's contribution, by its shapes: numbered pieces and their connections."""
 
     unbonded: tuple[Region, ...]
     missing: tuple[Region, ...]
@@ -93,7 +93,7 @@ class _Gap(NamedTuple):
 
 
 def void_graph(laminate: Laminate) -> VoidGraph:
-    """The graph of all voids; equal interfaces and films are cut into pieces once."""
+    """Return the graph of all voids; equal interfaces and films are split into pieces once."""
     graph = VoidGraph()
     left, low, right, high = widened(laminate.bounds, 10)
     frame = rectangle((left, low), (right, high))
@@ -134,7 +134,7 @@ def void_graph(laminate: Laminate) -> VoidGraph:
 def _voids(
     kind: VoidKind, level: int, pieces: Sequence[Region], frame: Region | None = None
 ) -> list[Void]:
-    """The voids of pieces; the piece that reaches the frame is the outside."""
+    """Return the voids of pieces; the piece that reaches the frame is the outside."""
     return [
         OUTSIDE if frame and piece.bounds[0] == frame.bounds[0] else Void(kind, level, number)
         for number, piece in enumerate(pieces)
@@ -142,21 +142,19 @@ def _voids(
 
 
 def _known(voids: Sequence[Void], pieces: Sequence[Region]) -> dict[Void, Region]:
-    """Voids with their regions, without the outside."""
+    """Return the voids with regions, without the outside."""
     return {v: piece for v, piece in zip(voids, pieces, strict=True) if v != OUTSIDE}
 
 
 @cached
 def _openings(film: Region, frame: Region) -> tuple[Region, ...]:
-    """The places without a film in a frame."""
+    """Return the areas of a frame without film."""
     return (frame - film).pieces
 
 
 @cached
 def _homes(film: Region, contact: Region, frame: Region) -> tuple[tuple[int, Point], ...]:
-    """The piece of a gap that each opening of a film lies over: just one, as film is missing all
-    over it, and the middle of the opening.
-    """
+    """Return the piece of a gap above each opening of a film, and a point inside the opening."""
     missing, homes = _openings(contact, frame), []
     for opening in _openings(film, frame):
         edge = max(opening.edges, key=lambda edge: edge.length)
@@ -165,7 +163,7 @@ def _homes(film: Region, contact: Region, frame: Region) -> tuple[tuple[int, Poi
 
 
 def chambers_by_level(laminate: Laminate) -> dict[int, frozenset[str]]:
-    """The chambers that have a pocket in each chamber interface, by its index."""
+    """Return the chambers with a pocket in each chamber interface, by its index."""
     levels = [interface.index for interface in laminate.interfaces if interface.kind == "chamber"]
     return {
         level: frozenset(chamber.name for chamber in laminate.chambers if chamber.is_in(balloon))
@@ -176,7 +174,7 @@ def chambers_by_level(laminate: Laminate) -> dict[int, frozenset[str]]:
 def _tube_in(
     opening: Region, layer: Layer, graph: VoidGraph, ports: tuple[Port, ...]
 ) -> Port | None:
-    """The port whose tube fills an opening of an outer film; a tube fills one opening."""
+    """Return the port whose tube fills an opening of an outer film; a tube fills one opening."""
     for port in ports:
         is_beside = layer.index in (port.below, port.above) and port.name not in graph.holes
         if port.kind == "hole" and is_beside and opening.contains(port.at):
@@ -206,7 +204,7 @@ def _gap(
 
 
 def _bounded(pieces: tuple[Region, ...], p: Point) -> int:
-    """The number of the piece that has ``p`` on an edge."""
+    """Return the number of the piece with an edge through ``p``."""
     # Most lie in the box of that piece alone.
     inside = [
         number
@@ -245,14 +243,14 @@ def _add_gap(
 
 
 def mouth_of(inlet: int) -> Void:
-    """Return the mouth of an inlet by its place in ``laminate.inlets``."""
+    """Return the mouth of an inlet, by its index in ``laminate.inlets``."""
     return Void("mouth", inlet)
 
 
 def _outlets(edge: Edge, inlets: Mapping[int, Inlet]) -> Iterator[tuple[Void, Point]]:
-    """Yield the mouths that an edge of the outline lies in, and the outside for the rest of it.
+    """Yield the mouths on an edge of the outline, and the outside for its remainder.
 
-    Each comes with the middle of its stretch.
+    Each comes with the midpoint of its stretch.
     """
     covered = []
     for number, inlet in inlets.items():
@@ -268,9 +266,9 @@ def _outlets(edge: Edge, inlets: Mapping[int, Inlet]) -> Iterator[tuple[Void, Po
 
 
 def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | None:
-    """Return the part of an edge on a mouth's line within ``reach`` mm of the mouth's middle.
+    """Return the part of an edge on a mouth's line within ``reach`` mm of the mouth's midpoint.
 
-    As shares of the edge's length; None if it has no such part.
+    As fractions of the edge's length; None if there is none.
     """
     start, end = inlet.offset(edge.start), inlet.offset(edge.end)
     if not isinstance(edge, Line) or start == end:
@@ -285,7 +283,7 @@ def _share_at(edge: Edge, inlet: Inlet, reach: float) -> tuple[float, float] | N
 def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, float]]:
     """Return the openings of an interface's voids at an inlet's mouth, from end to end.
 
-    Offsets from the mouth's middle in mm; an opening may reach past the mouth.
+    Offsets are from the mouth's midpoint in mm; an opening may extend past the mouth.
     """
     spans = sorted(
         sorted((inlet.offset(edge.start), inlet.offset(edge.end)))
@@ -302,7 +300,7 @@ def mouth_openings(inlet: Inlet, interface: Interface) -> list[tuple[float, floa
 
 
 def past_mouth(laminate: Laminate, level: int, p: Point) -> Clause | None:
-    """Return how a mouth's opening reaches past it at a place; None without a mouth."""
+    """Return the distance that an opening extends past its mouth; None without a mouth."""
     interface = laminate.interfaces[level - 1]
     for inlet in laminate.inlets if interface.kind == "chamber" else ():
         for low, high in mouth_openings(inlet, interface):
@@ -331,10 +329,10 @@ def _holding(pieces: tuple[Region, ...], p: Point) -> int:
 
 @dataclass(frozen=True)
 class Cavity:
-    """Unbonded pieces of an interface and the gaps beside them, which air fills as one.
+    """Unbonded pieces of an interface and the adjacent gaps, which air fills as one.
 
-    ``region`` has no hole where a film has one. ``is_open_film``: no unbonded piece is part of it,
-    so that it is a hole of a film and no more.
+    ``region`` excludes the holes of films. ``is_open_film``: the cavity is only a film hole,
+    without unbonded pieces.
     """
 
     interface: int
@@ -344,7 +342,7 @@ class Cavity:
 
 
 def cavities(laminate: Laminate, graph: VoidGraph) -> tuple[Cavity, ...]:
-    """Return the cavities of all interfaces, bottom to top; equal ones share a region."""
+    """Return the cavities of all interfaces, bottom to top; equal interfaces share a region."""
     regions: dict[tuple[object, ...], Region] = {}
     patterns = {interface.index: interface.pattern for interface in laminate.interfaces}
     parts = {**graph.pieces, **graph.gaps}
@@ -364,7 +362,7 @@ def cavities(laminate: Laminate, graph: VoidGraph) -> tuple[Cavity, ...]:
 
 
 def _beside(graph: VoidGraph, start: Void, parts: dict[Void, Region]) -> list[Void]:
-    """The voids of an interface that hang together without a way through a film."""
+    """Return the voids of an interface that are connected without passing through a film."""
     group, queue = {start}, [start]
     while queue:
         for void in graph.joins.get(queue.pop(), {}):

@@ -84,7 +84,7 @@ class YieldDesign:
 
     @property
     def sentence(self) -> str:
-        """The changes and the yield they reach, or why no change reaches the target."""
+        """The changes and the resulting yield, or the reason why no change reaches the target."""
         if self.design is not None and self.share is None:
             return f"{self.given.name} fails other rules, so that nothing was changed for its yield"
         changes = ", ".join(f"{change.key} = {change.values[1]}" for change in self.changes)
@@ -118,12 +118,8 @@ def reach_yield(
     fixed: Collection[str] = (),
     progress: Progress = ignore_progress,
 ) -> YieldDesign:
-    """Return the design with what a yield of ``target`` needs, but for the keys that are ``fixed``.
-
-    In this order, until a change is enough: the order of stacking, which changes no film; bond and
-    overhang, up to 0.1 mm wider; a more exact base plate; pins in ears; and all of these with bond
-    and overhang up to 1.28 mm wider. Of bond and overhang the least that is enough. The design
-    passes every other rule; one that fails another rule as it is given is returned unchanged.
+    """Return the design with the changes needed for a yield of ``target``, except keys that are
+    ``fixed``.
     """
     targeted = design.with_({TARGET: target})
     free = (key for key in (BOND, OVERHANG) if key not in fixed and targeted.uses(key))
@@ -267,7 +263,7 @@ def _smallest(trials: _Trials, way: Way, most: int) -> Steps | None:
 
 
 def _least(is_short: Callable[[int], bool], most: int) -> int | None:
-    """Return the fewest steps, up to ``most``, that are not short; None if all are."""
+    """Return the fewest steps, at most ``most``, that suffice; None if none do."""
     short, enough = -1, 0
     while is_short(enough):
         if enough >= most:

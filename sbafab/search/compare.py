@@ -84,7 +84,7 @@ TextOrNone = str | None
 
 
 class RuleDifference(Document):
-    """A rule whose verdict or margin differs, or its measured value if it has no limit; None if a
+    """A rule whose verdict or margin differs, or its measured value without a limit; None if a
     design has no such finding.
     """
 
@@ -177,7 +177,7 @@ def compare(
     of range.
     """
     if pressures_kpa is not None and not pressures_kpa:
-        raise DesignError("pressures_kpa is empty; a comparison needs one pressure or more")
+        raise DesignError("pressures_kpa is empty; a comparison needs at least one pressure")
     each = []
     for number, (design, source) in enumerate(zip((first, second), sources, strict=True)):
         progress(f"predicting {design.name}", number, 2)
@@ -206,7 +206,7 @@ def compare(
 def _paired(
     a: Mapping[Key, Value], b: Mapping[Key, Value]
 ) -> list[tuple[Key, tuple[Value | None, Value | None]]]:
-    """Return both values of each key, None if one has no such key."""
+    """Return both values of each key, None if a design lacks it."""
     return [(key, (a.get(key), b.get(key))) for key in dict.fromkeys([*a, *b])]
 
 
@@ -257,12 +257,12 @@ ComparedRows = list[tuple[str, ...]]
 
 
 def key_rows(keys: Iterable[KeyDifference]) -> ComparedRows:
-    """Return keys with both values."""
+    """Return the keys that differ, with the value in each design."""
     return [(row.key, *map(format_value, row.values)) for row in keys]
 
 
 def rule_rows(rules: Iterable[RuleDifference]) -> ComparedRows:
-    """Return rules with both verdicts and margins, or measured values if there is no limit."""
+    """The rules that differ, with both verdicts and margins, or measured values without a limit."""
     rows: ComparedRows = []
     for rule in rules:
         cells = []
@@ -275,7 +275,7 @@ def rule_rows(rules: Iterable[RuleDifference]) -> ComparedRows:
 
 
 def figure_rows(pairs: Iterable[FigurePair]) -> ComparedRows:
-    """Return figures with both values and 90 % intervals."""
+    """Return the figures that differ, with both values and 90 % intervals."""
     rows: ComparedRows = []
     for pair in pairs:
         cells = []
@@ -335,7 +335,7 @@ def _flat(comparison: DesignComparison) -> PageSection:
 
 
 def _inflated(comparison: DesignComparison) -> PageSection:
-    """Return pictures at one scale: with several chambers one is filled, otherwise all are."""
+    """Return pictures at one scale: one chamber is filled if there are several."""
     pressure = comparison.pressures_kpa[0]
     bodies, notes = [], ["", ""]
     for number, each in enumerate(comparison.designs):
@@ -370,7 +370,7 @@ DESIGNS = "as given", "changed"
 
 
 class ChangeEntry(Document):
-    """A key, and its values as given and as changed."""
+    """A key, and its original and changed values."""
 
     key: str
     given: Any = Field(validation_alias=AliasPath("values", 0), serialization_alias="from")
@@ -378,7 +378,7 @@ class ChangeEntry(Document):
 
 
 class YieldEntry(Document):
-    """Result of --target-yield; figures as given and as changed."""
+    """The result of --target-yield; figures before and after the changes."""
 
     target_yield: PlainNumber = attribute("target")
     changes: list[ChangeEntry]

@@ -1,7 +1,7 @@
 """Search for the design that meets all requirements and is best in one quantity.
 
-Rules are checked only for a candidate that would become the best. The result lists the binding
-constraints and can be written as a design file.
+Rules are checked only for a candidate that would otherwise become the best. The result lists the
+binding constraints and can be written as a design file.
 """
 
 from __future__ import annotations
@@ -89,12 +89,12 @@ class FoundDesign:
 
     @property
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """90 % intervals of measurements of the best design, by quantity in its unit."""
+        """The 90 % intervals of measurements of the best design, by quantity in its unit."""
         return {name: f.interval for name, f in self.figures.items() if f.interval}
 
     @property
     def flags(self) -> dict[str, tuple[Flag, ...]]:
-        """Limits to trust in figures of the best design, by quantity."""
+        """The validity limits of figures of the best design, by quantity."""
         return {name: f.flags for name, f in self.figures.items() if f.flags}
 
     @property
@@ -104,7 +104,7 @@ class FoundDesign:
 
     @property
     def holds(self) -> bool:
-        """True if the best design meets all requirements and every rule passes."""
+        """True if the best design meets all requirements and passes every rule."""
         return self.best.holds
 
     def __repr__(self) -> str:
@@ -119,7 +119,7 @@ class FoundDesign:
 
     @property
     def without_room(self) -> list[Spare]:
-        """Rules on lengths that pass with nothing to spare."""
+        """Rules for lengths that pass without margin."""
         laminate = self.best.laminate
         return [
             Spare(rule.rule, rule.measured or 0.0, rule.unit, place_text(laminate, rule.where))
@@ -171,7 +171,7 @@ class FoundDesign:
 
 @dataclass(frozen=True)
 class Binding:
-    """A step of one key that would improve the design, and what it breaks."""
+    """A step of one key that would improve the design, and the constraints it breaks."""
 
     key: str
     value: Any
@@ -180,7 +180,7 @@ class Binding:
 
 @dataclass(frozen=True)
 class Spare:
-    """A rule whose worst value, ``measured`` in ``unit``, has nothing to spare, and its place."""
+    """A rule without margin at its worst value, ``measured`` in ``unit``, and its place."""
 
     rule: str
     measured: float
@@ -203,7 +203,7 @@ class RangeEnd:
 
     @property
     def wider(self) -> tuple[float, float]:
-        """Ends of a range twice as wide, and at least a step wider, in the better direction."""
+        """The ends of a range twice as wide, and at least a step wider, in the better direction."""
         span = max(self.high - self.low, self.step)
         if self.above:
             return self.low, self.high + span
@@ -260,9 +260,9 @@ KNOWN_BY_FILM = ("mass", "burst", "reference_stroke")
 
 
 def free_keys(request: FindRequest) -> tuple[Free, ...]:
-    """Return the free keys, restricted by the requirements on them.
+    """Return the free keys, restricted by requirements on them.
 
-    Raises DesignError, also if the design has no such quantity.
+    Raises DesignError, also if the design lacks a quantity.
     """
     design = request.design
     names = {quantity.name for quantity in request.quantities}
@@ -276,9 +276,7 @@ def free_keys(request: FindRequest) -> tuple[Free, ...]:
     for requirement in request.requirements:
         _refuse_fixed(requirement, design, keys)
     if not free:
-        raise DesignError(
-            f"the search may change no key of {design.name}; name one with --free KEY=LOW:HIGH:STEP"
-        )
+        raise DesignError(f"{design.name} has no free key; name one with --free KEY=LOW:HIGH:STEP")
     narrowed = tuple(_within(key, request.requirements) for key in free)
     if not any(key.startswith(OF_FILMS) for key in keys):
         _refuse_films(request)
@@ -312,14 +310,14 @@ def _refuse_films(request: FindRequest) -> None:
 
 
 def _refuse_unsure(request: FindRequest, sure: float) -> None:
-    """Raises DesignError for an invalid probability, and for requirements that cannot have one."""
+    """Raise DesignError for an invalid probability, and for requirements that cannot have one."""
     if not 0.5 < sure < 1:
         raise DesignError(f"sure = {sure:g} must be above 0.5 and below 1, such as 0.9")
     design = request.design
     if uncertainty_of(design) is None:
         raise DesignError(
-            f"sure = {sure:g} needs a calibration, and models.calibration of {design.name} is "
-            f'"{design.models.calibration}"; name one such as "paper", or leave sure out'
+            f"sure = {sure:g} needs a calibration, but models.calibration of {design.name} is "
+            f'"{design.models.calibration}"; set it, such as to "paper", or omit sure'
         )
     for quantity in (requirement.quantity for requirement in request.requirements):
         is_drawn = quantity.name in NAMES and NAMES[quantity.name].is_drawn
@@ -328,20 +326,18 @@ def _refuse_unsure(request: FindRequest, sure: float) -> None:
             is_reference = quantity.name == "reference_stroke"
             instead = "ask for stroke@10kPa" if is_reference else "leave sure out"
             raise DesignError(
-                f"sure = {sure:g}: no calibrated model gives {quantity.label} of {design.name}, so "
-                f"that its probability is not known; {instead}"
+                f"sure = {sure:g}: no calibrated model predicts {quantity.label} of "
+                f"{design.name}, so its probability is unknown; {instead}"
             )
 
 
 def _refuse_fixed(requirement: Requirement, design: Design, free: Sequence[str]) -> None:
-    """Raises DesignError if a requirement on a key contradicts its value and the key is not
-    free.
-    """
+    """Raise DesignError if a requirement on a key contradicts its value and the key is not free."""
     key = requirement.quantity.key
     value = key_values(design).get(key or "")
     if isinstance(value, str):
         raise DesignError(
-            f"{key} is a word, {shown(value)}, and has no least or most; set it with --set, or let "
+            f"{key} is a word, {shown(value)}, and cannot have a limit; set it with --set, or let "
             f"the search choose with --free {key}={value},..."
         )
     if key not in free and isinstance(value, int | float) and not requirement.holds(value):
@@ -352,15 +348,15 @@ def _refuse_fixed(requirement: Requirement, design: Design, free: Sequence[str])
 
 
 def _within(free: Free, requirements: Sequence[Requirement]) -> Free:
-    """The range restricted by requirements on the key itself. Raises DesignError if it is empty."""
+    """Return the range restricted by requirements on the key. Raises DesignError if it is empty."""
     for requirement in requirements:
         if requirement.quantity.key != free.key:
             continue
         limit, at_least = requirement.limit, requirement.at_least
         if (limit > free.high if at_least else limit < free.low) and not free.widens:
             raise DesignError(
-                f"{free.key} must be {requirement.bound}, and its range is {free.low:g} to "
-                f"{free.high:g}; give it another one with --free {free.key}=LOW:HIGH:STEP"
+                f"{free.key} must be {requirement.bound}, but its range is {free.low:g} to "
+                f"{free.high:g}; change it with --free {free.key}=LOW:HIGH:STEP"
             )
         if at_least:
             low = max(free.low, limit)
@@ -381,9 +377,9 @@ TIGHT = ("bond-width", "mask-overhang", "tube-fit", "film-limits", "press-fit", 
 
 
 def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Binding]:
-    """Yield the binding constraints: what each improving single step breaks.
+    """Yield the binding constraints: those that each improving step breaks.
 
-    For the nearest miss: the steps to designs that cannot be made, or that no model covers.
+    For the nearest miss: the steps to designs that cannot be built or evaluated.
     """
     for axis, neighbour, is_inside in space.neighbours(point):
         if not is_inside:
@@ -404,7 +400,7 @@ def bindings(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Bind
 
 
 def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[RangeEnd]:
-    """Yield the keys whose range alone prevents a better design, or a nearer miss."""
+    """Yield the keys whose range is the only obstacle to a better design, or a nearer miss."""
     for axis, neighbour, is_inside in space.neighbours(point):
         free = space.free[axis]
         if is_inside or free.choices or space.is_excluded(axis, neighbour):
@@ -419,8 +415,8 @@ def range_ends(space: SearchSpace, point: GridPoint, best: Trial) -> Iterator[Ra
 def pareto_front(space: SearchSpace, best: Trial) -> tuple[list[Trial], int]:
     """Return the Pareto-optimal designs among those tried that pass all rules, and their number.
 
-    The best is first, also if another one equals it in the goal; the rest are in the order of the
-    goal. If they are many, the ends and some between are returned.
+    The best is first, even if another equals it in the goal; the rest are in the order of the goal.
+    If there are many, the ends and some in between are returned.
     """
     goal = space.request.goal.quantity
     sides = [
@@ -449,7 +445,7 @@ RING = 1.0
 
 
 def place_text(laminate: Laminate, where: Place) -> str:
-    """For example "at the lumen", "at the inlet tab of chamber2"; empty if unknown."""
+    """Return a place as text, such as "at the lumen"; empty if unknown."""
     if where.x is None or where.y is None:
         return ""
     x, y = where.x, where.y
@@ -494,7 +490,7 @@ class RequirementEntry(Document):
 
 
 class FindDocument(Document, schema="sbafab/find@1"):
-    """Output of ``find --json``; names that are keys are quantities."""
+    """The output of ``find --json``; names that are keys are quantities."""
 
     holds: bool
     file: str | None
@@ -545,11 +541,10 @@ def find_document(outcome: FoundDesign, origin: str, target: Path) -> dict[str, 
 
 
 def refuse_existing(target: Path) -> None:
-    """Raises OutputError if the file exists: designs are never overwritten."""
+    """Raise OutputError if the file exists: designs are never overwritten."""
     if target.exists():
         raise OutputError(
-            f"{target} exists and is not overwritten; name another folder with -o or file with "
-            "--to, or remove it first"
+            f"{target} exists; choose another folder with -o or file with --to, or remove it first"
         )
 
 
@@ -588,7 +583,7 @@ def _paths_beside(target: Path, data: Mapping[str, Any], design: Design) -> dict
 
 
 def write_found(text: str, target: Path) -> None:
-    """Raises OutputError if it cannot be written, also if a file appeared meanwhile."""
+    """Write the result. Raises OutputError if that fails, also if a file appeared meanwhile."""
     with writing(target):
         target.parent.mkdir(parents=True, exist_ok=True)
         with target.open("x", encoding="utf-8", newline="\n") as opened:

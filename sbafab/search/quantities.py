@@ -1,8 +1,8 @@
 """Quantities of requirements: sizes, mass, yield, stroke, bend, force, stiffness, time, and a
 design's keys.
 
-Each is the figure of ``predict``, from the same function: a stroke is its free stroke at a
-pressure; bends, forces, stiffness and times come from the elastic stack.
+Each is a figure of ``predict``, from the same function: a stroke is the free stroke at a pressure;
+bends, forces, stiffness and times come from the elastic stack.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ from sbafab.search.vary import key_values
 class QuantityName(NamedTuple):
     """A quantity as users write it, with its unit and meaning.
 
-    ``more``: to be maximised; all others are minimised. ``is_drawn``: of the drawing and its
-    tolerances; all others are predicted.
+    ``more``: to be maximised; others are minimised. ``is_drawn``: from the drawing and its
+    tolerances; others are predicted.
     """
 
     written: str
@@ -149,13 +149,13 @@ HOW = (
     'for example overall_diameter, mass, stroke, "stroke@50kPa", "bend@2chambers@5kPa", '
     '"force@12.5mm@50kPa", "force@50%@50kPa" or chamber.diameter'
 )
-ONE_STROKE = f"a force needs one stroke, and only a force takes one; {HOW}"
+ONE_STROKE = f"a force needs exactly one stroke, and other quantities have none; {HOW}"
 
 
 @dataclass(frozen=True)
 class RequestedQuantity:
-    """A quantity by name or dotted key, ``at`` the conditions that are named: the pressure, a
-    force's rise or share of the reference stroke, a bend's chambers, a time's flow.
+    """A quantity by name or dotted key, at the conditions ``at``: the pressure, a force's rise or
+    share of the reference stroke, a bend's chambers, a time's flow.
     """
 
     name: str
@@ -179,14 +179,14 @@ class RequestedQuantity:
 
     @property
     def key(self) -> str | None:
-        """The design key that the quantity stands for, or None."""
+        """The design key of the quantity, or None."""
         if self.name == "lumen":
             return "lumen.diameter"
         return self.name if "." in self.name else None
 
     @property
     def figure(self) -> tuple[Quantity, Conditions] | None:
-        """The figure of ``predict`` and its conditions; None of the drawing and its keys."""
+        """The figure of ``predict`` and its conditions; None for the drawing and its keys."""
         if self.name not in FIGURES:
             return None
         of, usual, _ = FIGURES[self.name]
@@ -196,11 +196,11 @@ class RequestedQuantity:
 
     @property
     def kpa(self) -> float | None:
-        """The gauge pressure in kPa, of a time the one that it ends at; None without one."""
+        """The gauge pressure in kPa, for a time the final one; None without one."""
         return self.figure[1].kpa if self.figure else None
 
     def is_calibrated(self, form: Form) -> bool:
-        """Return True if a calibrated model gives the quantity."""
+        """Return True if a calibrated model predicts the quantity."""
         is_oblong = isinstance(form.pockets, Slots) and self.name != "height"
         return FIGURES.get(self.name, ("",))[-1] == CALIBRATED and not is_oblong
 
@@ -208,7 +208,7 @@ class RequestedQuantity:
 def read_quantity(
     text: str, kpa: float | None = None, flow_ml_min: float = WATER_FLOW
 ) -> RequestedQuantity:
-    """Return the quantity of a text; ``kpa`` is used if it names no pressure, ``flow_ml_min`` if a
+    """Return the quantity in a text. ``kpa`` is used if it names no pressure, ``flow_ml_min`` if a
     time names no flow. Raises DesignError.
     """
     name, *places = (part.strip() for part in text.split("@"))
@@ -216,7 +216,7 @@ def read_quantity(
     takes = TAKES.get(name, ("kpa",) if name in AT_PRESSURE else ())
     if places and not takes:
         named = f"{', '.join(AT_PRESSURE[:-1])} and {AT_PRESSURE[-1]}"
-        raise DesignError(f"{shown(text)}: only {named} take a pressure; {HOW}")
+        raise DesignError(f"{shown(text)}: only {named} can have a pressure; {HOW}")
     if name not in NAMES and "." not in name:
         raise DesignError(f"{shown(text)} is not a quantity; {hint(name, [*NAMES, 'any key'])}")
     try:
@@ -227,8 +227,8 @@ def read_quantity(
 
 
 def read_measured(text: str) -> MeasuredValue:
-    """Return a value that was measured on an actuator, such as "stroke@10kPa=16.6mm"; with a
-    pressure "height" is the full height there. Raises DesignError.
+    """Return a value measured on an actuator, such as "stroke@10kPa=16.6mm"; with a pressure
+    "height" is the full height at it. Raises DesignError.
     """
     name, is_given, value = (part.strip() for part in text.rpartition("="))
     if not is_given:
@@ -237,7 +237,9 @@ def read_measured(text: str) -> MeasuredValue:
     is_full = of_height.strip() == "height" and bool(place)
     quantity = read_quantity(f"stroke@{place}" if is_full else name)
     if quantity.figure is None:
-        raise DesignError(f"{shown(text)} is of the drawing, and narrows no prediction")
+        raise DesignError(
+            f"{shown(text)} is a property of the drawing, which does not narrow a prediction"
+        )
     of, at = quantity.figure
     try:
         number = read_limit(quantity, value)
@@ -249,7 +251,7 @@ def read_measured(text: str) -> MeasuredValue:
 
 
 def safer(quantity: RequestedQuantity, at_least: bool) -> RequestedQuantity:
-    """The quantity to compare with a limit: of the inflated diameters, the conservative one."""
+    """The quantity to compare with a limit: the conservative one of the inflated diameters."""
     if quantity.name not in (REACHED, WIDEST):
         return quantity
     return RequestedQuantity(REACHED if at_least else WIDEST)
@@ -287,7 +289,7 @@ def _condition(place: str, takes: Sequence[str]) -> tuple[str, float]:
     if "flow" in takes:
         flow = None if is_bare else in_first_unit(place, MILLILITRES_PER_MINUTE)
         if flow is None:
-            raise ValueError("a time takes one flow, such as time@35ml/min")
+            raise ValueError("a time has one flow, such as time@35ml/min")
         return "flow", flow
     if count is not None and "chambers" in takes:
         return "chambers", int(count[1])
@@ -304,9 +306,10 @@ def _condition(place: str, takes: Sequence[str]) -> tuple[str, float]:
 
 
 def _kilopascals(place: str) -> float | None:
-    """The pressure of a text such as 50kPa, its unit in capitals or not; None if it is not one.
+    """Return the pressure of a text such as 50kPa, with its unit in either case; None for other
+    text.
 
-    MPa and mPa are not the same: an ambiguous unit is rejected.
+    MPa and mPa differ: an ambiguous unit is rejected.
     """
     number = place.rstrip(ascii_letters)
     unit = place[len(number) :]
@@ -325,7 +328,7 @@ def read_limit(quantity: RequestedQuantity, text: str) -> float:
         number = in_first_unit(text, units)
         if number is None:
             raise ValueError(
-                f"must be a number, in {quantity.unit} or with one of {', '.join(units)}"
+                f"must be a number in {quantity.unit}, or with a unit: {', '.join(units)}"
             )
     else:
         try:
@@ -340,9 +343,7 @@ def read_limit(quantity: RequestedQuantity, text: str) -> float:
 
 
 def read_share(text: str) -> float:
-    """Return a share from a text such as 0.95 or 95%. Raises ValueError with the end of a
-    sentence.
-    """
+    """Return a share such as 0.95 or 95%. Raises ValueError with the end of a sentence."""
     read = share_of(text)
     if read is None or not 0 <= read <= 1:
         raise ValueError("must be a fraction from 0 to 1, such as 0.95 or 95%")
@@ -350,7 +351,7 @@ def read_share(text: str) -> float:
 
 
 def shown_value(quantity: RequestedQuantity, value: float) -> str:
-    """A figure with its unit, for display."""
+    """Return a figure with its unit, for display."""
     if quantity.name == "force" and value < 0:
         return "none, it does not rise that far"
     return f"{value:.4g} {quantity.unit}".rstrip()
@@ -371,7 +372,7 @@ class Requirement:
     at_least: bool
 
     def margin(self, value: float) -> float:
-        """Return the margin of a value as a share of the limit; negative if it breaks the limit."""
+        """The margin of a value as a fraction of the limit; negative if it breaks the limit."""
         more = value - self.limit if self.at_least else self.limit - value
         return more / (abs(self.limit) or 1.0)
 
@@ -384,7 +385,7 @@ class Requirement:
 
     @property
     def bound(self) -> str:
-        """For example "at least 3 N"."""
+        """The limit as text, such as "at least 3 N"."""
         return f"{self.sense} {self.limit:.10g} {self.quantity.unit}".strip()
 
 
@@ -406,10 +407,10 @@ class Goal:
 def read_all(
     least: Sequence[str], most: Sequence[str], best: str = "mass", flow_ml_min: float = WATER_FLOW
 ) -> tuple[tuple[Requirement, ...], Goal]:
-    """The requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
+    """Return the requirements of ``QUANTITY=VALUE`` texts, and the goal. Raises DesignError.
 
-    A quantity without its pressure takes the highest pressure named by any of them, or the largest
-    vacuum, a time without a flow takes ``flow_ml_min``.
+    A quantity without a pressure uses the highest pressure in any of them, or the largest vacuum; a
+    time without a flow uses ``flow_ml_min``.
     """
     pairs = [(text, True) for text in least] + [(text, False) for text in most]
     texts = [*(text.partition("=")[0] for text, _ in pairs), best]
@@ -437,15 +438,15 @@ def _read(text: str, at_least: bool, kpa: float | None, flow_ml_min: float) -> R
 
 
 def _refuse_contradictions(requirements: Sequence[Requirement], texts: Sequence[str]) -> None:
-    """Raises DesignError if a quantity's lower limit is above its upper limit."""
+    """Raise DesignError if a quantity's lower limit is above its upper limit."""
     pairs = permutations(zip(requirements, texts, strict=True), 2)
     for (least, least_text), (most, most_text) in pairs:
         is_pair = least.at_least and not most.at_least and least.limit > most.limit
         # The inflated diameter that must reach never exceeds the one that must not touch.
         if is_pair and least.quantity == safer(most.quantity, at_least=True):
             raise DesignError(
-                f"--min {shown(least_text)} and --max {shown(most_text)} contradict each other; no "
-                "design can meet both, so change one"
+                f"--min {shown(least_text)} and --max {shown(most_text)} contradict each other; "
+                "change one of them"
             )
 
 
@@ -460,10 +461,11 @@ def measured(
     pressures_kpa: Sequence[float] = (),
     probability: float | None = None,
 ) -> tuple[float, Figure | None]:
-    """Return the value of a quantity of a design in its unit, and the figure of ``predict`` that it
-    is, if any; ``good`` is the share of good builds, the others as in ``figure``.
+    """Return the value of a quantity of a design in its unit, and its figure of ``predict``, if
+    any.
 
-    Raises DesignError if the design has no such quantity, or no model covers it.
+    ``good`` is the share of good builds, the others are as in ``figure``. Raises DesignError if the
+    design lacks the quantity, or no model covers it.
     """
     name, form = quantity.name, design.form
     if quantity.figure is None:
@@ -471,13 +473,13 @@ def measured(
         value = others.get(name)
         if isinstance(value, int | float):
             return float(value), None
-        raise DesignError(f"{design.name} has no {name} that is a number")
+        raise DesignError(f"{design.name} has no {name} as a number")
     of, at = quantity.figure
     kind = FIGURES[name][-1]
     is_of_stack = kind in ("", CALIBRATED)
     if not is_of_stack and (form.mechanism is None or form.mechanism.kind != kind):
         has = f"a mechanism of {form.mechanism.kind}" if form.mechanism else "no mechanism"
-        raise DesignError(f"{name} is of a {kind}, and the design has {has}")
+        raise DesignError(f"{name} needs a {kind}, but the design has {has}")
     if of is Quantity.BEND:
         refuse_bend(quantity, design)
     if of is Quantity.FREE_STROKE and isinstance(form.pockets, Slots):
@@ -506,15 +508,15 @@ def measured(
 def refuse_absent(
     quantity: RequestedQuantity, design: Design, free: Sequence[str], option: str
 ) -> None:
-    """Raises DesignError for an unknown key, with the likely one, and for a quantity that the
-    design's family does not have; also for a bend for which no chamber would stay empty. The
-    ``free`` keys vary by the ``option``.
+    """Raise DesignError for an unknown key, with the likely one, and for a quantity that the
+    design's family lacks. Also for a bend for which no chamber would stay empty. The ``free`` keys
+    vary by the ``option``.
     """
     name, form = quantity.name, design.form
     if "." in name and name not in key_paths(type(design)):
         design.with_({name: 1})
     if name == "lumen" and form.lumen is None:
-        raise DesignError(f"{design.name} has no lumen; ask for one of a lobed design")
+        raise DesignError(f"{design.name} has no lumen; only lobed designs do")
     if name in ROUND_A_TUBE and form.wrap is None:
         raise DesignError(f"{design.name} has no {name}; only radial designs do")
     if name == "bend" and COUNT not in free:
@@ -527,9 +529,9 @@ def refuse_bend(quantity: RequestedQuantity, design: Design, more: str = "") -> 
     """
     form, chambers = design.form, quantity.at.chambers or 1
     if not form.is_parallel:
-        raise DesignError(f"{design.name} does not bend; only chambers side by side do")
+        raise DesignError(f"{design.name} does not bend; only parallel chambers do")
     if chambers >= form.stacks:
         raise DesignError(
-            f"{quantity.label}: {design.name} has {form.stacks} chambers, and a bend is of at most "
-            f"{form.stacks - 1} of them, the others empty{more}"
+            f"{quantity.label}: {design.name} has {form.stacks} chambers; a bend needs at most "
+            f"{form.stacks - 1} filled and the others empty{more}"
         )

@@ -1,9 +1,9 @@
 """The designs of a search: its free keys, each candidate evaluated once, and which are tried.
 
-Small spaces are evaluated completely; else a coarse grid and local searches from its best points,
-then steps from the best candidate. A local search takes steps along a key, along two
-keys against each other, and with one key held fixed: if a requirement ties keys together, only a
-step of one key that the others follow makes progress.
+Small spaces are evaluated completely; otherwise a coarse grid and local searches from its best
+points, then steps from the best candidate. A local search takes steps along a key, along two keys
+in opposite directions, and with one key fixed: if a requirement couples keys, only a step of one
+key with the others adjusted makes progress.
 """
 
 from __future__ import annotations
@@ -46,10 +46,11 @@ TRIES = 240
 
 @dataclass(frozen=True)
 class FindRequest:
-    """Requirements and goal of a search, and the design it starts from.
+    """Requirements and goal of a search, and its initial design.
 
-    ``free`` are the keys it may change in place of the family's own, if any. With ``sure``, a share
-    above 0.5 and below 1, each requirement on a predicted quantity must hold with that probability.
+    ``free`` are the keys that it may change instead of the family's own, if any. With ``sure``, a
+    share above 0.5 and below 1, each requirement on a predicted quantity must hold with that
+    probability.
     """
 
     design: Design
@@ -61,7 +62,7 @@ class FindRequest:
 
     @property
     def quantities(self) -> list[RequestedQuantity]:
-        """The quantities to evaluate: the requirements' first, then the goal's."""
+        """The quantities to evaluate: those of the requirements first, then of the goal."""
         return [*(requirement.quantity for requirement in self.requirements), self.goal.quantity]
 
     def measured(
@@ -72,7 +73,7 @@ class FindRequest:
         good: float | None = None,
         probability: float | None = None,
     ) -> tuple[float, Figure | None]:
-        """Return a quantity of a candidate, with maps that reach all pressures of the request."""
+        """Return a quantity of a candidate, with maps that cover all pressures of the request."""
         kpa = [each.kpa for each in self.quantities if each.kpa is not None]
         return measured(quantity, design, laminate, good, kpa, probability)
 
@@ -114,7 +115,7 @@ class Trial:
 
     @property
     def holds(self) -> bool:
-        """True if nothing is missed and the design can be made."""
+        """True if the design can be built and misses nothing."""
         return self.missed == 0.0 and not self.refused
 
     @property
@@ -129,23 +130,23 @@ class Trial:
         return [f"{rule.rule}: {rule.message}" for rule in failed]
 
     def value(self, requirement: Requirement | Goal) -> float:
-        """The figure for a requirement or the goal, in its unit."""
+        """Return the figure for a requirement or the goal, in its unit."""
         return self.figures[requirement.quantity.label]
 
     def judged(self, requirement: Requirement) -> float:
-        """Return the value to compare with the limit, in its unit: the end of the interval on its
-        side, if there is one.
+        """Return the value to compare with the limit, in its unit: the relevant end of the
+        interval, if there is one.
         """
         interval = self.intervals.get(requirement.quantity.label)
         return interval[not requirement.at_least] if interval else self.value(requirement)
 
     def meets(self, requirement: Requirement) -> bool:
-        """Return True if the value, or its bound, holds the limit."""
+        """Return True if the value, or its bound, meets the limit."""
         return requirement.holds(self.judged(requirement))
 
 
 def evaluated(request: FindRequest, values: Mapping[str, Any], with_rules: bool = False) -> Trial:
-    """Return the candidate with these values; without rules, only requirements count: quicker."""
+    """The candidate with these values; without rules, only requirements count, which is faster."""
     rules: Mapping[str, Finding] | None = None
     figures: dict[str, float] = {}
     try:
@@ -198,7 +199,7 @@ def _add_figures(
         if probability and figure and figure.interval:
             intervals[label] = figure.interval
         elif probability and figure and quantity.is_calibrated(design.form) and label != "height":
-            raise DesignError(f"{label} is not known at other factors of the calibration")
+            raise DesignError(f"{label} is unknown for some factors of the calibration")
     return intervals
 
 
@@ -214,7 +215,7 @@ def figure_text(request: FindRequest, trial: Trial, requirement: Requirement) ->
 
 
 def misses(request: FindRequest, trial: Trial) -> list[str]:
-    """Return what a candidate breaks, one sentence each: requirements, then rules."""
+    """The constraints that a candidate breaks, one sentence each: requirements, then rules."""
     if trial.refused:
         return [trial.refused]
     broken = [
@@ -229,7 +230,7 @@ def misses(request: FindRequest, trial: Trial) -> list[str]:
 
 
 def numbers_of(value: Any) -> list[float]:
-    """The numbers of a key with a list, such as one diameter per balloon; else empty."""
+    """Return the numbers of a key with a list, such as one diameter per balloon; else empty."""
     return list(map(float, value)) if isinstance(value, list | tuple) and value else []
 
 
@@ -239,8 +240,8 @@ def read_free(
     fixed: Sequence[str] = (),
     assigned: Sequence[str] = (),
 ) -> tuple[Free, ...]:
-    """Return the family's own keys without those ``fixed``, replaced by the keys of ``free``: texts
-    or records, or one text alone.
+    """Return the family's free keys without ``fixed`` ones, replaced by the keys of ``free``: texts
+    or records, or a single text.
 
     Keys ``assigned`` by hand do not change, except lists, which are scaled as a whole; an envelope
     to fit determines the chamber. Raises DesignError.
@@ -258,30 +259,30 @@ def read_free(
     for key in dict.fromkeys(fixed):
         if key not in assigned and every.pop(key, None) is None:
             raise DesignError(
-                f"--fix {shown(key)}: a search changes {', '.join(every) or 'nothing'} by default"
+                f"--fix {shown(key)}: by default a search changes {', '.join(every) or 'nothing'}"
             )
     # Named keys are free whatever the requirements name.
     every |= {key.key: key for key in named}
     if "stack.balloons" in every and numbers_of(keys.get("chamber.diameter")):
         raise DesignError(
-            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, and a "
-            "search scales that list; leave it out, or give one diameter"
+            "--free stack.balloons: chamber.diameter lists a diameter for each balloon, which a "
+            "search scales; omit stack.balloons, or give one diameter"
         )
     return tuple(every.values())
 
 
 def free_of(design: Design, free: str | Iterable[Free | str]) -> tuple[Free, ...]:
-    """Return the keys that a caller names, in place of the family's own. Raises DesignError."""
+    """Return the keys named by a caller, instead of the family's own. Raises DesignError."""
     return read_free(design, free, [key.key for key in design.free])
 
 
 def _free_of(text: object) -> Free:
-    """``KEY=LOW:HIGH:STEP``, or ``KEY=word,word`` for a key with a choice of words."""
+    """The free key in ``KEY=LOW:HIGH:STEP``, or in ``KEY=word,word`` for a choice of words."""
     if isinstance(text, Free):
         return text
     if not isinstance(text, str):
         raise DesignError(
-            f"free holds {shown(text)}; give texts KEY=LOW:HIGH:STEP, for example "
+            f"free contains {shown(text)}; give texts KEY=LOW:HIGH:STEP, for example "
             '["chamber.diameter=3:12:0.1"]'
         )
     free = read_varied(text, "--free")
@@ -299,7 +300,7 @@ def _free_of(text: object) -> Free:
 class SearchSpace:
     """The candidates evaluated so far, each once, by the steps of their free keys.
 
-    ``lows`` and ``highs`` are the least and the largest step of each key, ``start`` the starting
+    ``lows`` and ``highs`` are the least and largest step of each key, ``start`` the initial
     design's point, or the nearest to it. At most ``tries`` candidates are evaluated; the current
     stage ends at ``limit``.
     """
@@ -321,12 +322,12 @@ class SearchSpace:
 
     @property
     def size(self) -> int:
-        """Number of designs in the space."""
+        """The number of designs in the space."""
         return math.prod(self.counts) if self.counts else 0
 
     @property
     def counts(self) -> list[int]:
-        """Number of values of each key."""
+        """The number of values of each key."""
         counts: list[int] = (self.highs - self.lows + 1).tolist()
         return counts
 
@@ -335,7 +336,7 @@ class SearchSpace:
         return round(self.free[axis].low + point[axis] * self.free[axis].step, 6)
 
     def values(self, point: GridPoint) -> Mapping[str, Any]:
-        """Return the keys' values at a point, whole numbers if low and step are.
+        """Return the keys' values at a point; integers if low and step are integers.
 
         A list, such as the diameters of a tapered stack, is scaled as a whole.
         """
@@ -354,8 +355,8 @@ class SearchSpace:
         return tuple(np.clip(steps, self.lows, self.highs).tolist())
 
     def neighbours(self, point: GridPoint) -> Iterator[tuple[int, GridPoint, bool]]:
-        """Yield the points one step of one key away, each with the key's number, and whether its
-        range holds it.
+        """Yield the points one step of one key away, with the key's number and whether its range
+        contains it.
         """
         for axis, by in itertools.product(range(len(point)), (-1, 1)):
             at = point[axis] + by
@@ -372,7 +373,7 @@ class SearchSpace:
     def trial(self, point: GridPoint, checks_rules: bool = True) -> Trial:
         """Return the candidate at a point; its rules are checked if it would be the best so far.
 
-        Without ``checks_rules`` they are not: rules take most of the time.
+        Without ``checks_rules`` they are not checked, since rules take most of the time.
         """
         if point not in self.trials:
             self._tell("trying designs", len(self.trials), self.request.tries)
@@ -396,7 +397,7 @@ class SearchSpace:
         return evaluated(self.request, trial.values, with_rules=True)
 
     def best(self) -> tuple[GridPoint, Trial]:
-        """Return the best candidate, rules checked; if they make it worse, the next one is
+        """Return the best candidate with rules checked; if they make it worse, the next one is
         tried.
         """
         while True:
@@ -408,7 +409,7 @@ class SearchSpace:
 
 
 def _step_of(free: Free, value: Any) -> int:
-    """Return the step of a key's value; of a list its largest number."""
+    """Return the step of a key's value; for a list, of its largest number."""
     if free.choices:
         return free.choices.index(value) if value in free.choices else 0
     at = max(numbers_of(value), default=value)
@@ -435,7 +436,7 @@ SEED = 20_240
 
 
 def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -> SearchSpace:
-    """Return the space of a request after all tries that lead further."""
+    """Return the space of a request after the whole search."""
     space = SearchSpace(request, free, progress)
     if space.size <= request.tries:
         for steps in np.ndindex(*space.counts):
@@ -448,8 +449,8 @@ def searched(request: FindRequest, free: tuple[Free, ...], progress: Progress) -
 
 
 def _explore(space: SearchSpace) -> None:
-    """Evaluate a coarse grid, then search locally from its best points that lie far apart, with
-    steps that are halved if none is better.
+    """Evaluate a coarse grid, then search locally from its best distant points, halving steps that
+    do not improve.
 
     While no design passes, it restarts from random points, as long as tries are left.
     """
@@ -473,7 +474,7 @@ def _explore(space: SearchSpace) -> None:
 def _grid(space: SearchSpace) -> Iterator[list[int]]:
     """Yield the steps of each key on a coarse grid, as fine as its share of the tries allows.
 
-    Keys with words keep their starting value: the walks from the grid change them.
+    Keys with words keep their initial value: the walks from the grid change them.
     """
     room = max(8.0, GRID_SHARE * space.request.tries)
     numbers = sum(not free.choices for free in space.free)
@@ -486,7 +487,7 @@ def _grid(space: SearchSpace) -> Iterator[list[int]]:
 
 
 def _starts(space: SearchSpace) -> list[GridPoint]:
-    """Return the starting point and the best points of the grid that lie far apart."""
+    """Return the initial point and the best grid points that are far apart."""
     starts = [space.start]
     for point in sorted(space.trials, key=lambda point: space.trials[point].rank):
         apart = 3 * np.abs(np.subtract(starts, point)) > space.counts
@@ -505,7 +506,7 @@ def _refine(space: SearchSpace) -> None:
 
 
 def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
-    """Return True if a search with a key fixed a step or two away finds a better candidate."""
+    """Return True if a search with a key fixed one or two steps away finds a better candidate."""
     counts = space.counts
     axes = [axis for axis, count in enumerate(counts) if 1 < count <= FEW and len(counts) > 1]
     for axis, by in itertools.product(sorted(axes, key=lambda axis: counts[axis]), FIXED_STEPS):
@@ -521,7 +522,7 @@ def _has_better_walk(space: SearchSpace, point: GridPoint) -> bool:
 def _walks(
     space: SearchSpace, point: GridPoint, shares: Iterable[int], fixed: int | None = None
 ) -> GridPoint:
-    """Return the end of walks with strides of each key's range over a share; one key is fixed."""
+    """The end of walks with strides of each key's range over ``share``, with one key fixed."""
     for share in shares:
         strides = [max(1, count // share) for count in space.counts]
         if fixed is not None:
@@ -531,10 +532,10 @@ def _walks(
 
 
 def _walk(space: SearchSpace, point: GridPoint, stride: Sequence[int]) -> GridPoint:
-    """Return the end of improving steps: along one key, or along two against each other.
+    """Return the end of improving steps: along one key, or along two in opposite directions.
 
-    Where two requirements meet, only a step of both keys makes progress. A move that improved is
-    repeated. A key whose stride is 0 is held fixed.
+    Where two requirements meet, only a step of both keys makes progress. An improving move is
+    repeated. A key with a stride of 0 is fixed.
     """
     steps = [by for by in np.diag(stride) if by.any()]
     steps += [a - b for a, b in itertools.combinations(steps, 2)]

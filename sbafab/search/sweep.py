@@ -84,7 +84,7 @@ class SweepRequest:
 
 @dataclass(frozen=True)
 class SweptDesigns:
-    """Result of a sweep: its folder, number of designs by outcome, number measured in this run.
+    """The result of a sweep: its folder, number of designs by outcome, number measured in this run.
 
     ``table`` holds the rows; ``no_longer_asked`` counts designs of an earlier sweep in the tables
     that it has replaced.
@@ -100,7 +100,7 @@ class SweptDesigns:
 
     @property
     def failed(self) -> dict[str, int]:
-        """Number of designs by each rule and limit that they fail."""
+        """The number of designs that fail each rule and limit."""
         return {
             cause: len(told)
             for cause, told in self.table.causes.items()
@@ -109,7 +109,7 @@ class SweptDesigns:
 
     @property
     def rows(self) -> list[dict[str, Any]]:
-        """One row per design, with the columns of ``sweep.csv``; units are in their names."""
+        """One row per design, with the columns of ``sweep.csv``; their names include units."""
         names = self.table.written
         return [dict(zip(names, cells, strict=True)) for cells in self.table.cells(names)]
 
@@ -119,7 +119,7 @@ class SweptDesigns:
 
 
 class SweepDocument(Document, schema="sbafab/sweep@1"):
-    """Output of ``sweep --json``."""
+    """The output of ``sweep --json``."""
 
     folder: Path
     designs: int
@@ -134,7 +134,7 @@ class SweepDocument(Document, schema="sbafab/sweep@1"):
 
 
 def designs_of(request: SweepRequest) -> list[Values]:
-    """The values of every design, in the tables' order. Raises DesignError."""
+    """Return the values of every design, in the tables' order. Raises DesignError."""
     varied = [_from_here(varied_key) for varied_key in request.varied]
     refuse_unknown(request.design, varied)
     if request.samples is None:
@@ -143,7 +143,7 @@ def designs_of(request: SweepRequest) -> list[Values]:
 
 
 def sweep(request: SweepRequest, out: Path, progress: Progress = ignore_progress) -> SweptDesigns:
-    """Measures all designs into ``out/<name>-sweep/`` and returns the result.
+    """Measure all designs into ``out/<name>-sweep/`` and return the result.
 
     Measurements of an earlier run are reused if design, values and program are the same. Raises
     DesignError for bad input, OutputError if nothing can be written or no worker answers.
@@ -207,12 +207,12 @@ def _measure(
 
 
 def _labels(request: SweepRequest) -> list[str]:
-    """The labels of the quantities that have limits."""
+    """Return the labels of the quantities with limits."""
     return list(dict.fromkeys(row.quantity.label for row in request.requirements))
 
 
 def _judged(row: SweepRow, requirements: Sequence[Requirement]) -> SweepRow:
-    """Return the row with each quantity that has limits as a rule, which fails if one is missed."""
+    """Return the row with each limited quantity as a rule, which fails if its limit is missed."""
     if "quantities" not in row:
         return row
     rules, failed = dict(row["rules"]), dict(row.get("failed", {}))
@@ -234,7 +234,7 @@ def _judged(row: SweepRow, requirements: Sequence[Requirement]) -> SweepRow:
 
 
 def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
-    """A hash of each design and of the request, for this program version."""
+    """Return a hash of each design and of the request, for this program version."""
     question = [fingerprint(), design_sha256(request.design), list(request.pressures_kpa)]
     question += [_labels(request)] if request.requirements else []
     return [
@@ -244,7 +244,7 @@ def _keys(request: SweepRequest, values: Sequence[Values]) -> list[str]:
 
 
 def _contents(values: Values) -> dict[str, Any]:
-    """The values; for a drawing or a kit, the file's content."""
+    """Return the values, with the file's content for a drawing or kit."""
     return {
         key: hashlib.sha256(Path(value).read_bytes()).hexdigest()
         if key in (OUTLINE, KIT) and isinstance(value, str) and Path(value).is_file()
@@ -254,7 +254,7 @@ def _contents(values: Values) -> dict[str, Any]:
 
 
 def _from_here(varied: Free) -> Free:
-    """With paths of drawings and kits relative to the working directory, wherever they are read."""
+    """Return the tables with paths of drawings and kits relative to the working directory."""
     if varied.key not in (OUTLINE, KIT):
         return varied
     paths = tuple(
@@ -271,7 +271,7 @@ def _locked(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         if (folder / MANIFEST).exists():
             raise OutputError(
-                f"{folder} holds a design of that name; choose another folder with -o"
+                f"{folder} contains a design of that name; choose another folder with -o"
             )
         try:
             with FileLock(folder / ".lock", timeout=0):
@@ -287,10 +287,10 @@ def _locked(folder: Path) -> Iterator[None]:
 
 
 class Journal:
-    """Rows of measured designs in a file, by the hash of design and request; read when needed.
+    """Rows of measured designs in a file, by the hash of design and request; read on demand.
 
-    A line left incomplete by a killed run is skipped and its design measured again; so is a design
-    that timed out at a limit below ``seconds``. Raises OutputError if the file cannot be written.
+    An incomplete line of a killed run is skipped and its design measured again, as is a design that
+    timed out at a limit below ``seconds``. Raises OutputError if the file cannot be written.
     """
 
     def __init__(self, path: Path, seconds: float) -> None:
@@ -312,7 +312,7 @@ class Journal:
         return key in self._places
 
     def add(self, key: str, row: SweepRow) -> None:
-        """Writes a row, unless there is one already."""
+        """Write a row, unless it exists already."""
         if key in self._places:
             return
         line = json.dumps({"key": key, "row": row}, ensure_ascii=False, separators=(",", ":"))
@@ -322,21 +322,21 @@ class Journal:
         self._file.flush()
 
     def rows(self, keys: Iterable[str]) -> Iterator[SweepRow]:
-        """The rows of these keys, in order, one in memory at a time."""
+        """Yield the rows of these keys in order, with one in memory at a time."""
         with self.path.open("rb") as opened:
             for key in keys:
                 opened.seek(self._places[key])
                 yield json.loads(opened.readline())["row"]
 
     def close(self) -> None:
-        """Flushes the written rows to disk."""
+        """Flush the written rows to disk."""
         self._file.flush()
         os.fsync(self._file.fileno())
         self._file.close()
 
 
 def _key_of(line: bytes, seconds: float) -> str | None:
-    """The key of a complete line that need not be measured again."""
+    """Return the key of a complete line that need not be measured again."""
     try:
         entry = json.loads(line)
         key, row = entry["key"], entry["row"]

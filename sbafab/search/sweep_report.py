@@ -123,7 +123,7 @@ class Table:
 
     def first(self, quantity: Quantity, at: Conditions = ANYWHERE) -> str:
         """Return the column of the first figure of a quantity, at conditions that match ``at``, by
-        the model to design with: the calibrated one, else the first; empty if no row has any.
+        the design model: the calibrated one, else the first; empty if no row has one.
         """
         columns = {
             c: f for c, f in self.figures.items() if f.quantity is quantity and f.at.meet(at)
@@ -134,7 +134,7 @@ class Table:
         return next(calibrated if self.is_calibrated else iter(()), next(iter(same), ""))
 
     def cells(self, names: Iterable[str]) -> Iterator[list[Any]]:
-        """The cells of every row in these columns; None for empty cells."""
+        """Yield the cells of every row in these columns; None for empty cells."""
         chosen = list(names)
         for number, row in enumerate(self.rows(), 1):
             head = (number, row.get("sha256", ""), row["outcome"], row["reason"])
@@ -216,7 +216,7 @@ def _both(columns: Columns, x: str, y: str, outcome: str) -> list[tuple[float, f
 
 
 def passes_svg(columns: Columns, keys: Sequence[str]) -> str:
-    """Outcomes by the value of each key; of two keys with numbers also by both."""
+    """Return the chart of outcomes by the value of each key; for two numeric keys also by both."""
     panels = [_bars(columns, key) for key in keys]
     if len(keys) == 2 and all(any(map(_is_number, columns[key])) for key in keys):
         x, y = keys
@@ -226,8 +226,8 @@ def passes_svg(columns: Columns, keys: Sequence[str]) -> str:
 
 
 def trades_svg(columns: Columns, pairs: Sequence[tuple[str, str]]) -> tuple[str, set[int]]:
-    """One panel per pair of a cost and a gain with the front of passing designs, and the numbers of
-    designs on any front.
+    """Return one panel per pair of a cost and a gain with the front of passing designs, and the
+    numbers of designs on any front.
     """
     on_front: set[int] = set()
     panels = []
@@ -254,7 +254,7 @@ def _drawn(title: str, panels: Sequence[Panel]) -> str:
 
 
 def _bars(columns: Columns, key: str) -> Panel:
-    """Stacked counts of designs by outcome, by value or in equal bins of it."""
+    """Return stacked counts of designs by outcome, by value or in equal bins."""
     names, group = _groups(columns[key])
     counts = Counter(zip(columns["outcome"], group, strict=True))
     heights = {outcome: [counts[outcome, n] for n in range(len(names))] for outcome in OUTCOMES}
@@ -278,7 +278,7 @@ def _specks(
 
 
 def _groups(column: Sequence[Any]) -> tuple[list[str], list[int]]:
-    """Names of the values, or of bins if there are many, and the index of each design."""
+    """The names of the values, or of bins if there are many, and the index of each design."""
     are_numbers = all(map(_is_number, column))
     distinct = list(dict.fromkeys(map(repr, column)))
     if len(distinct) <= MOST_BARS or not are_numbers:
@@ -308,8 +308,8 @@ MOST_ROWS = 60
 
 
 class PageSection(NamedTuple):
-    """A part of a page: ``lines``, a drawing, ``pictures`` side by side (name, data URI, or a note
-    in place of one), and a table, of which rows in ``grey`` are of no interest.
+    """A section of a page: ``lines``, a drawing, ``pictures`` side by side (name, data URI or a
+    note), and a table, with unimportant rows in ``grey``.
     """
 
     title: str
@@ -337,7 +337,7 @@ def page_html(
 def sweep_html(
     design: Design, varied: Sequence[Free], table: Table, limits: Iterable[str] = ()
 ) -> str:
-    """Return the whole page of a sweep, whose ``limits`` are told at its head."""
+    """Return the whole page of a sweep, with its ``limits`` in the head."""
     keys = [swept.key for swept in varied]
     costs, gains = _objectives(table)
     names = ["outcome", *keys, *costs, *gains]
@@ -380,8 +380,8 @@ def _trade_offs(
     columns: Columns,
     pairs: Sequence[tuple[str, str]],
 ) -> Iterator[PageSection]:
-    """Yield the pictures of trade-offs, with the paper's measured values of figures whose model is
-    off by more than a quarter, and the designs on their fronts.
+    """Yield the pictures of trade-offs, with the paper's measured values if the model deviates by
+    more than a quarter, and the designs on their fronts.
     """
     trades, best = trades_svg(columns, pairs)
     calibration = factors_of(design).calibration
@@ -425,9 +425,9 @@ def _objectives(table: Table) -> tuple[list[str], list[str]]:
 
 
 def front(rows: Sequence[Sequence[float]], more: Sequence[bool]) -> list[int]:
-    """Return the numbers of the non-dominated rows, in order; of equal rows the first.
+    """Return the numbers of the non-dominated rows, in order; the first of equal rows.
 
-    ``more`` says for each value whether more of it is better.
+    ``more`` tells for each value whether more is better.
     """
     signed = [
         tuple(-value if up else value for value, up in zip(row, more, strict=True)) for row in rows

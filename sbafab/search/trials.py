@@ -1,7 +1,7 @@
 """Run the trials of a sweep: measure designs in local processes, or on a Dask cluster.
 
-A trial is a design's rules with their margins, its predicted figures, and all its keys. As a
-program this module measures designs one after the other, and may be killed at any moment.
+A trial consists of a design's rules with their margins, its predicted figures, and all its keys. As
+a program this module measures designs one after another, and may be killed at any moment.
 """
 
 from __future__ import annotations
@@ -60,8 +60,8 @@ def measured(
 ) -> SweepRow:
     """Return the row of the design in ``tables`` with ``values`` set; never raises a SbafabError.
 
-    Relative paths start at ``folder``; ``pressures``, kPa, are for forces and strokes;
-    ``quantities`` are labels of those that have limits.
+    Relative paths are based on ``folder``; ``pressures`` in kPa apply to forces and strokes;
+    ``quantities`` are labels of those with limits.
     """
     row: SweepRow = {"outcome": "refused", "reason": ""}
     families = records()
@@ -92,13 +92,13 @@ def measured(
 
 
 def failure(messages: Mapping[str, str]) -> SweepRow:
-    """Return the outcome of a design that fails, of the message of each rule and limit."""
+    """Return the outcome of a failing design, from the message of each rule and limit."""
     reason = " | ".join(f"{name}: {message}" for name, message in messages.items())
     return {"outcome": "fails", "failed": dict(messages), "reason": reason}
 
 
 def _add_quantities(row: SweepRow, quantities: Sequence[RequestedQuantity], of: Build) -> None:
-    """Add quantities to a row, and figures of theirs that it has not."""
+    """Add quantities to a row, and those of their figures that it lacks."""
     good = row["yield"][0] if row["yield"] else None
     kpa = [quantity.kpa for quantity in quantities if quantity.kpa is not None]
     row["quantities"] = {}

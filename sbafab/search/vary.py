@@ -68,7 +68,7 @@ def _of_values(key: str, values: Iterable[Any]) -> Free:
     is_one = isinstance(values, Mapping) or not isinstance(values, Iterable)
     table = as_in_a_file([values] if is_one else list(values))
     if not table:
-        raise DesignError(f"vary has no value for {key}; give at least one")
+        raise DesignError(f"vary has no values for {key}; give at least one")
     return _listed(key, table, key, "vary")
 
 
@@ -100,7 +100,7 @@ def _range(key: str, parts: Sequence[str], words: str, example: str) -> Free:
     if len(steps) > 1:
         raise DesignError(f"{words} is not START:STOP:STEP; {example}")
     if stop < start:
-        raise DesignError(f"{words} stops below its start; write the smaller number first")
+        raise DesignError(f"{words} ends below its start; write the smaller number first")
     if not steps:
         return Free(key, float(start), float(stop), 0.0)
     (step,) = steps
@@ -109,8 +109,7 @@ def _range(key: str, parts: Sequence[str], words: str, example: str) -> Free:
     count = int((stop - start) / step) + 1
     if count > MOST_VALUES:
         raise DesignError(
-            f"{words} gives {count:,} values, and at most {MOST_VALUES:,} are allowed; make STEP "
-            "larger"
+            f"{words} gives {count:,} values; the limit is {MOST_VALUES:,}; increase STEP"
         )
     return Free(key, float(start), float(start + (count - 1) * step), float(step))
 
@@ -120,20 +119,22 @@ def _listed(key: str, values: Sequence[Any], text: str, option: str) -> Free:
         values = [float(value) if type(value) is int else value for value in values]
     if len(values) > MOST_VALUES:
         raise DesignError(
-            f"{option} {key} has {len(values):,} values, and at most {MOST_VALUES:,} are allowed"
+            f"{option} {key} has {len(values):,} values; the limit is {MOST_VALUES:,}"
         )
     for number, value in enumerate(values):
         if value in values[:number]:
-            raise DesignError(f"{option} {shown(text)} names {shown(value)} twice; once is enough")
+            raise DesignError(f"{option} {shown(text)} lists {shown(value)} twice; remove one")
     return Free.of_choices(key, values)
 
 
 def refuse_unknown(design: Design, varied: Sequence[Free], option: str = "--vary") -> None:
-    """Raises DesignError for a key unknown to the design, and for one varied twice."""
+    """Raise DesignError for a key unknown to the design, and for a key varied twice."""
     keys = [free.key for free in varied]
     for free in varied:
         if keys.count(free.key) > 1:
-            raise DesignError(f"{option} {free.key} is given twice; put all its values into one")
+            raise DesignError(
+                f"{option} {free.key} is given twice; combine its values in one option"
+            )
         problems = []
         for value in free.values:
             try:
@@ -146,18 +147,18 @@ def refuse_unknown(design: Design, varied: Sequence[Free], option: str = "--vary
 
 
 def grid(varied: Sequence[Free]) -> Iterator[Values]:
-    """Every value of every key with every other's, the last key the fastest. Raises DesignError."""
+    """All combinations of the keys' values, the last key varying fastest. Raises DesignError."""
     for free in varied:
         if not free.step:
             option = f"--vary {free.key}={free.low:g}:{free.high:g}"
             raise DesignError(
-                f"{option} has no step; add one, {option}:STEP, or draw from it with --samples N"
+                f"{option} has no step; add one, {option}:STEP, or sample it with --samples N"
             )
     count = math.prod(len(free.values) for free in varied)
     if count > MOST_DESIGNS:
         raise DesignError(
-            f"the grid has {count:,} designs, and at most {MOST_DESIGNS:,} are allowed; take "
-            "fewer values, or --samples N"
+            f"the grid has {count:,} designs; the limit is {MOST_DESIGNS:,}; use fewer values, "
+            "or --samples N"
         )
     names = [free.key for free in varied]
     every = itertools.product(*(free.values for free in varied))
@@ -165,9 +166,10 @@ def grid(varied: Sequence[Free]) -> Iterator[Values]:
 
 
 def latin_hypercube(varied: Sequence[Free], samples: int, seed: int) -> Iterator[Values]:
-    """``samples`` designs that divide each key's range into equal parts and use each part once.
+    """Return ``samples`` designs that divide each key's range into equal parts and use each part
+    once.
 
-    The same seed draws the same designs. Raises DesignError for more than are allowed.
+    The same seed gives the same designs. Raises DesignError for more than the limit.
     """
     if samples > MOST_DESIGNS:
         raise DesignError(f"--samples {samples:,} must be at most {MOST_DESIGNS:,}")

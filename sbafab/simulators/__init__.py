@@ -1,5 +1,5 @@
 """Simulators: CalculiX and Abaqus, SOFA, MuJoCo; one module each.
 
-In: a ``Laminate``, its meshes and load settings. Out: the input files of a simulator, and its
-result, read back and judged, after a run.
+Input: a ``Laminate``, its meshes and load settings. Output: the input files of a simulator and,
+after a run, its result, read back and judged.
 """

@@ -324,7 +324,7 @@ class Frame:
 
     @property
     def von_mises(self) -> Floats:
-        """Equivalent stress (n,) in MPa."""
+        """The von Mises stress (n,) in MPa."""
         xx, yy, zz, xy, yz, zx = self.stress.T
         direct = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
         equivalent: Floats = np.sqrt(direct / 2 + 3 * (xy**2 + yz**2 + zx**2))
@@ -332,11 +332,11 @@ class Frame:
 
 
 def read_frd(path: Path, nodes: int, whole: bool = True) -> list[Frame]:
-    """The frames of a result file in order of time.
+    """Return the frames of a result file in order of time.
 
-    ``nodes`` is the mesh's number of nodes. Without ``whole`` the file may end anywhere, as after
-    a stopped run; complete frames before the end are returned. Raises OutputError if the file
-    cannot be read, belongs to another mesh or, with ``whole``, is truncated.
+    ``nodes`` is the mesh's number of nodes. Without ``whole`` the file may end anywhere, as after a
+    stopped run; complete frames before the end are returned. Raises OutputError if the file cannot
+    be read, belongs to another mesh or, with ``whole``, is truncated.
     """
     try:
         content = path.read_bytes()
@@ -367,7 +367,7 @@ def _unread(path: Path, fault: str) -> OutputError:
 def _blocks(
     path: Path, content: bytes, nodes: int, whole: bool
 ) -> Iterator[tuple[float, bytes, Floats]]:
-    """Time, name and values (n, components) of each block of a known name."""
+    """Yield time, name and values (n, components) of each block of a known name."""
     for head in BLOCK.finditer(content):
         size = COMPONENTS.get(head[3])
         if size is None:
@@ -390,7 +390,7 @@ def _blocks(
 
 
 def read_sta(path: Path) -> float:
-    """The time in s up to which a run has converged so far; a partly written line is ignored."""
+    """Return the time in s that a run has reached; a partly written line is ignored."""
     reached = 0.0
     lines = path.read_text(encoding="ascii", errors="replace").split("\n") if path.is_file() else []
     for line in lines[2:-1]:
@@ -417,7 +417,7 @@ def history(
     settings: DeckSettings,
     frames: Sequence[Frame],
 ) -> list[State]:
-    """The states of a run from the unloaded one on; ``mesh`` is the mesh of the run."""
+    """Return the states of a run from the unloaded one; ``mesh`` is the mesh of the run."""
     tips, bases = (_poles(mesh, laminate, name) for name in ("tip", "base"))
     walls = {name: _walls(mesh, name) for name in settings.pressures}
     shares = meshed_shares(laminate, sector(laminate, symmetry))
@@ -459,8 +459,8 @@ def history(
 def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
     """Return True if films that face each other across a chamber have passed through each other.
 
-    ``mesh`` keeps the gaps between films; decks have no contact. Films of open chambers that lie on
-    each other from the start are ignored.
+    ``mesh`` keeps the gaps between films; decks have no contact. Films of open chambers that touch
+    from the start are ignored.
     """
     nodes = np.unique(_walls(mesh, chamber))
     x, y, z = mesh.points[nodes].T
@@ -474,7 +474,7 @@ def films_meet(mesh: Mesh, chamber: str, frame: Frame) -> bool:
 
 
 def _poles(mesh: Mesh, laminate: Laminate, name: str) -> Ints:
-    """The node of a set nearest to each stack's axis, if the axis lies in the mesh."""
+    """Return the node of a set nearest to each stack's axis, if the axis lies in the mesh."""
     nodes = mesh.node_sets[name]
     nearest = []
     for chamber in laminate.chambers:
@@ -486,7 +486,7 @@ def _poles(mesh: Mesh, laminate: Laminate, name: str) -> Ints:
 
 
 def _walls(mesh: Mesh, chamber: str) -> Ints:
-    """Triangles (k, 3) round the air, counter-clockwise seen from outside of it."""
+    """Return triangles (k, 3) around the air, counter-clockwise seen from outside."""
     if chamber in mesh.cavities:
         return mesh.cavities[chamber]
     faces = mesh.face_sets.get(f"cavity_{chamber}", np.empty((0, 2), dtype=np.int64))
@@ -494,14 +494,14 @@ def _walls(mesh: Mesh, chamber: str) -> Ints:
 
 
 def _volume(points: Floats, triangles: Ints) -> float:
-    """Return the volume within triangles in mm3; open sides must be upright (symmetry planes)."""
+    """Return the volume within triangles in mm3; open sides must be vertical (symmetry planes)."""
     a, b, c = points[triangles].transpose(1, 0, 2)
     across = np.cross(b - a, c - a)[:, 2]
     return float(np.sum(across * (a + b + c)[:, 2]) / 6)
 
 
 def history_csv(states: Sequence[State]) -> str:
-    """The states as CSV, one row each; the headers contain the units."""
+    """Return the states as CSV, one row each; the headers contain the units."""
     rows: list[dict[str, float]] = []
     for state in states:
         row = {"time_s": state.time}
@@ -522,7 +522,7 @@ def history_csv(states: Sequence[State]) -> str:
 def write_deformed(mesh: Mesh, frame: Frame, path: Path) -> None:
     """Write the deformed shape: ``displacement`` in mm, ``stress`` and ``von_mises`` in MPa.
 
-    To see the undeformed one, warp by the displacement with a factor of -1.
+    For the undeformed shape, warp by the displacement with a factor of -1.
     """
     # VTK orders a symmetric tensor like CalculiX.
     fields = {
@@ -541,7 +541,7 @@ DIVERGED = Stop("diverged", "its iterations no longer converge, however small th
 
 
 def find_ccx() -> str:
-    """Path of the solver. Raises OutputError if it is not installed."""
+    """Return the path of the solver. Raises OutputError if it is not installed."""
     return program_path(
         "ccx",
         "install CalculiX; on Debian and Ubuntu: apt install calculix-ccx",
@@ -555,7 +555,7 @@ def run_ccx(
     timeout: float,
     report: Callable[[float], None] | None = None,
 ) -> tuple[float, Stop | None]:
-    """Runs a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
+    """Run a deck in its folder to the time ``end``, for at most ``timeout`` seconds.
 
     Return the last converged time in s, and the reason if the run was stopped. The output of ccx
     goes to ``ccx.log`` there; ``report`` is called with the time reached, in s.
@@ -573,7 +573,7 @@ def run_ccx(
 
 
 def _complaint(log: Path, code: int, is_there: bool) -> Stop | None:
-    """Return the failure, if any; ccx's exit code is not enough, since it may be 0 on failure.
+    """Return the failure, if any; ccx's exit code may be 0 in spite of a failure.
 
     A diverging step that is retried with a smaller increment is not a failure.
     """
@@ -597,7 +597,7 @@ DATED = re.compile(rb"(?m)^(    1U(?:DATE|TIME|HOST|USER|DIR)).*$")
 
 
 def deck_mesh(laminate: Laminate, settings: MeshSettings) -> Mesh:
-    """The flat volume mesh for a deck. Raises DesignError, OutputError as meshing does."""
+    """Return the flat volume mesh for a deck. Raises DesignError and OutputError like meshing."""
     return volume_mesh(layup(laminate, settings))
 
 
@@ -609,7 +609,7 @@ def simulate(
     timeout: float,
     progress: Progress,
 ) -> Result:
-    """Inflates a laminate in CalculiX; ``folder`` receives deck, results and table.
+    """Inflate a laminate in CalculiX; ``folder`` receives deck, results and table.
 
     ``timeout`` is in seconds. A run that diverges or takes too long keeps its results so far.
     Raises OutputError if ccx is not installed or gives no results.
@@ -648,8 +648,8 @@ def simulate(
         number, reason = wrong
         if number == 0:
             raise VoidError(
-                f"the first result, at {_largest(states[1]):.3g} kPa, cannot be: {reason}; ask for "
-                "less in one chamber, or for less vacuum"
+                f"the first result, at {_largest(states[1]):.3g} kPa, is impossible: {reason}; "
+                "reduce the pressure in one chamber, or the vacuum"
             )
         frames, states = frames[:number], states[: number + 1]
     write_files({HISTORY: history_csv(states)}, folder)
@@ -711,7 +711,7 @@ def _first_wrong(
 
 
 def _largest(state: State) -> float:
-    """The pressure in kPa that is farthest from 0."""
+    """Return the pressure in kPa with the largest magnitude."""
     return max(state.pressures.values(), key=abs)
 
 
@@ -728,7 +728,7 @@ def _advice(stop: Stop, settings: DeckSettings) -> str:
 
 
 def _tidy(folder: Path) -> None:
-    """Removes ccx's working files, and dates and names from its result file."""
+    """Remove ccx's working files, and dates and names from its result file."""
     frd = folder / f"{JOB}.frd"
     frd.write_bytes(DATED.sub(rb"\1", frd.read_bytes()))
     of_ccx = [path for path in folder.glob(f"{JOB}.*") if path.suffix not in KEPT]
@@ -743,7 +743,7 @@ USES = ("h", "symmetry", "procedure")
 
 
 def why_not(laminate: Laminate) -> str | None:
-    """Every laminate can be meshed."""
+    """Return None: every laminate can be meshed."""
     return None
 
 
@@ -773,7 +773,7 @@ def _settings(laminate: Laminate, request: SimulationRequest) -> tuple[MeshSetti
     for name, meshed in images(laminate, mesh.symmetry).items():
         if settings.pressures[name] != settings.pressures[meshed]:
             raise DesignError(
-                f"symmetry {mesh.symmetry} computes {meshed} in place of {name}: give both one "
-                "pressure, or take symmetry full"
+                f"symmetry {mesh.symmetry} computes {meshed} in place of {name}; use equal "
+                "pressures for both, or symmetry full"
             )
     return mesh, settings

@@ -70,22 +70,23 @@ FLEXES = {
 
 
 def shell_of(stack: RoundStack, pressures: Mapping[str, float], sectors: int = SECTORS) -> Shell:
-    """The coarse shell of a stack of round pockets."""
+    """Return the coarse shell of a stack of round pockets."""
     # Films that fall far onto each other need many iterations.
     return coarse_shell(stack, sectors, nearly_flat if has_contact(pressures) else fullest)
 
 
 def has_contact(pressures: Mapping[str, float]) -> bool:
-    """Return True if films touch: films of chambers with a lower pressure than others do."""
+    """Return True if films touch, as films of chambers with a lower pressure than others do."""
     return len(set(pressures.values())) > 1
 
 
 def model_text(
     stack: RoundStack, shell: Shell, pressures: Mapping[str, float], sectors: int = SECTORS
 ) -> str:
-    """The model as a file: node i is body ``n<i>``, which is flat unless the keyframe is loaded.
+    """Return the model as a file: node i is body ``n<i>``, which is flat unless the keyframe is
+    loaded.
 
-    Fixed are the nodes of the base, or the centre of a lone balloon, so that it bulges both ways,
+    The nodes of the base are fixed, or the centre of a lone balloon, so that it bulges both ways,
     as in the CalculiX deck.
     """
     still = shell.roots if stack.balloons == 1 else shell.fixed
@@ -190,7 +191,7 @@ def run(
 def inflate(
     films: RecordedFilms, request: SimulationRequest, folder: Path, progress: Progress
 ) -> Result:
-    """Inflate the model that was written into a folder."""
+    """Inflate the model in a folder."""
     seconds = SECONDS if request.seconds is None else request.seconds
     command = [sys.executable, PYTHON, f"--seconds={seconds!r}", f"--record={NODES_FILE}"]
     model, times = folder / MODEL, (seconds, request.minutes)
@@ -201,10 +202,10 @@ def inflate(
 
 
 def read_log(text: str) -> tuple[str | None, float | None]:
-    """What MuJoCo, or else the last line, says of a script that did not come to its end, and the
+    """Return MuJoCo's message, or else the last line, of a script that did not finish, and the
     steps per s of one that did.
 
-    A run that is stopped has said nothing.
+    A stopped run gives no message.
     """
     ended = ENDED.search(text)
     lines = [line.strip() for line in text.splitlines() if line.strip()]
@@ -214,12 +215,12 @@ def read_log(text: str) -> tuple[str | None, float | None]:
 
 
 def _refuse_missing() -> None:
-    """Raises OutputError with a remedy if the package mujoco is missing or too old."""
+    """Raise OutputError with a remedy if the package mujoco is missing or too old."""
     if find_spec("mujoco") is None:
         raise OutputError(f"mujoco is not installed; {INSTALL}")
     installed = version("mujoco")
     if int(installed.split(".", maxsplit=1)[0]) < OLDEST:
         raise OutputError(
-            f"mujoco {installed} stretches films with a quarter of their modulus, {OLDEST}.0 does "
-            f"not; {INSTALL}"
+            f"mujoco {installed} stretches films with a quarter of their modulus; version "
+            f"{OLDEST}.0 does not; {INSTALL}"
         )

@@ -1,8 +1,8 @@
 """A stack as rigid plates on springs (MJCF), linearised about its pose at given pressures.
 
 A level tilts by half, rises, and tilts by the other half: hinges about x and y, a slide along z,
-hinges about y and x. The orders mirror each other, so that the twists of both halves cancel, and
-plates stand as in ``stack_loads.plate_chain`` up to the third order of a level's tilt.
+hinges about y and x. The order is mirrored, so that the twists of both halves cancel, and plates
+are positioned as in ``stack_loads.plate_chain`` up to third order in a level's tilt.
 """
 
 from __future__ import annotations
@@ -46,17 +46,18 @@ POSE = "pressed"
 
 def chain_text(name: str, stack: Stack, pressures: Sequence[float]) -> str:
     """Return a stack as MJCF, in mm, kg and s, which settles in its pose at pressures (kPa, one per
-    chamber) from any start. A chamber's control is the difference in kPa from its pressure.
+    chamber) from any start.
 
-    Raises DesignError if the stack has no stable pose there.
+    A chamber's control is the difference in kPa from its pressure. Raises DesignError if the stack
+    has no stable pose there.
     """
     pose = stack.pose(pressures)
     at = linearised_poses(stack.states_of(pose, None))
     listed = ", ".join(f"{pressure:g}" for pressure in pose.pressures)
     if np.linalg.eigvalsh(at.energy.matrix).min() <= 0:
         raise DesignError(
-            f"the pose at {listed} kPa is about to buckle, so that no springs "
-            "hold it; give other --pressures"
+            f"the pose at {listed} kPa is about to buckle, so springs cannot hold it; give other "
+            "--pressures"
         )
     span = valid_range(stack, pose, at)
     mass = MASS if stack.weight is None else stack.weight / GRAVITY / 1000
@@ -107,7 +108,7 @@ def valid_range(stack: Stack, pose: Pose, at: Linearised) -> float:
 
 
 def joint_values(freedoms: Array) -> Array:
-    """Return the values (levels, 5) of JOINTS, mm and rad, by rise and tilt (levels, 3)."""
+    """Return the values (levels, 5) of JOINTS, mm and rad, from rise and tilt (levels, 3)."""
     rise, x, y = np.asarray(freedoms, dtype=float).T
     return np.stack([x / 2, y / 2, rise, y / 2, x / 2], axis=-1)
 
@@ -122,11 +123,11 @@ Tendon = tuple[str, tuple[float, float] | None, list[tuple[str, float]]]
 
 
 def _springs(at: Linearised) -> Iterator[Tendon]:
-    """Three springs per level with the energy q H q / 2, where H = L D L^T are the second
-    derivatives by its freedoms: D holds stiffnesses, and L each spring's length by freedom.
+    """Return three springs per level with the energy q H q / 2.
 
-    Stiffer springs keep both halves of a tilt equal: MuJoCo's equality constraints ignore dampers,
-    and diverge with masses this small.
+    H = L D L^T are the second derivatives with respect to its freedoms: D holds stiffnesses, and L
+    each spring's length by freedom. Stiffer springs keep both halves of a tilt equal: MuJoCo's
+    equality constraints ignore dampers, and diverge with masses this small.
     """
     lower = np.linalg.cholesky(at.energy.matrix[0])
     roots = np.diagonal(lower, axis1=1, axis2=2)
@@ -144,7 +145,7 @@ def _springs(at: Linearised) -> Iterator[Tendon]:
 
 
 def _chambers(at: Linearised) -> Iterator[Tendon]:
-    """A tendon per chamber: its length grows like the chamber's volume, in ul."""
+    """Return a tendon per chamber, whose length increases like the chamber's volume, in ul."""
     filling = at.filling[0].T.reshape(-1, *at.at.shape[1:])
     for chamber, rates in enumerate(filling, start=1):
         parts = [part for level, ways in enumerate(rates, 1) for part in _joints(level, ways)]
@@ -152,7 +153,7 @@ def _chambers(at: Linearised) -> Iterator[Tendon]:
 
 
 def _joints(level: int, ways: Array) -> list[tuple[str, float]]:
-    """The joints of one level with their parts in a tendon's length, by its freedoms (3,)."""
+    """The joints of one level with their contributions to a tendon's length, by its freedoms."""
     # Ignore coefficients that are only rounding.
     least = 1e-9 * float(np.abs(ways).max())
     return [

@@ -1,4 +1,4 @@
-"""The shell that simulators take, and the coarse one of a stack of round pockets: mid-surfaces that
+"""The shell for simulators, and the coarse shell of a stack of round pockets: mid-surfaces that
 share nodes where bonded.
 
 Each round pocket has rings of nodes at bore, neck, edge and between neck and edge; the web between
@@ -44,11 +44,11 @@ class Shell:
     """Nodes (n, 3) at ``rest`` (flat) and at the start (``position``), and the films on them.
 
     ``membranes`` partition all triangles; in a group of ``bending`` an edge has at most two.
-    ``cavities`` are closed surfaces by chamber, normals out of the air. ``fixed`` nodes do not
-    move; the plane of the ``tip`` nodes, counter-clockwise from above, gives its tilt. ``mass`` is
-    the true mass in kg, ``size`` the largest pocket radius over 2.5 mm, ``about`` a sentence on the
-    mesh. ``roots`` and ``poles`` are the centres of the lowest and of the highest film over each
-    axis of round pockets.
+    ``cavities`` are closed surfaces by chamber, with normals away from the air. ``fixed`` nodes do
+    not move; the plane of the ``tip`` nodes, counter-clockwise from above, gives its tilt. ``mass``
+    is the true mass in kg, ``size`` the largest pocket radius over 2.5 mm, ``about`` a sentence on
+    the mesh. ``roots`` and ``poles`` are the centres of the lowest and of the highest film over
+    each axis of round pockets.
     """
 
     rest: Floats
@@ -66,16 +66,16 @@ class Shell:
 
     @property
     def triangles(self) -> Triangles:
-        """All films."""
+        """The triangles of all films."""
         return np.concatenate([group.triangles for group in self.membranes])
 
     @property
     def height(self) -> float:
-        """Height at the start in mm."""
+        """The initial height in mm."""
         return float(self.position[:, 2].max())
 
     def volume(self, chamber: str, nodes: Floats | None = None) -> float:
-        """Volume of the chamber's cavity at the start, or with other places of the nodes."""
+        """The volume of the chamber's cavity at the start, or with other positions of the nodes."""
         points = self.position if nodes is None else nodes
         return Surface(points, self.cavities[chamber]).volume
 
@@ -99,9 +99,9 @@ NECK_SHARE, BORE_SHARE = 0.5, 0.2
 class RoundStack:
     """A stack of round balloons; radii in mm.
 
-    ``pockets`` and ``rims`` (pocket and outline) are given by balloon, bottom to top; ``axes``
-    by chamber; ``hub`` is the outline's radius between two lobes, ``lumen`` the radius of the hole
-    in the films; both are 0 for a single axis.
+    ``pockets`` and ``rims`` (pocket and outline) are given by balloon, bottom to top; ``axes`` by
+    chamber; ``hub`` is the outline's radius between two lobes, ``lumen`` the radius of the hole in
+    the films; both are 0 for a single axis.
     """
 
     name: str
@@ -117,7 +117,7 @@ class RoundStack:
 
     @property
     def radius(self) -> float:
-        """Distance of the chamber axes from the actuator's."""
+        """The distance of the chamber axes from the actuator's."""
         return math.hypot(*self.axes[0])
 
     @property
@@ -130,7 +130,7 @@ class RoundStack:
 
     @property
     def size(self) -> float:
-        """Mean pocket radius relative to the measured pocket of 5 mm."""
+        """The mean pocket radius relative to the measured pocket of 5 mm."""
         return sum(self.pockets) / self.balloons / 2.5
 
     @property
@@ -148,13 +148,13 @@ class RoundStack:
         return self.young * self.film.thickness
 
     def bending(self, films: int) -> float:
-        """Bending stiffness of ``films`` bonded films, in mN mm."""
+        """Return the bending stiffness of ``films`` bonded films, in mN mm."""
         return self.young * (films * self.film.thickness) ** 3 / (12 * (1 - self.poisson**2))
 
     def with_fair_rings(self, sectors: int) -> RoundStack:
-        """Return the stack whose rings of ``sectors`` corners have the area of these circles.
+        """Return the stack with rings of ``sectors`` corners that have the area of these circles.
 
-        An octagon in the pocket would have 10 % less area than the pocket.
+        An inscribed octagon would have 10 % less area than the pocket.
         """
         grown = math.sqrt(math.tau / sectors / math.sin(math.tau / sectors))
         return replace(
@@ -167,7 +167,7 @@ class RoundStack:
 
 
 def round_stack(laminate: Laminate) -> RoundStack:
-    """The stack of a laminate. Raises DesignError if its pockets are not round."""
+    """Return the stack of a laminate. Raises DesignError if its pockets are not round."""
     if any(layer.role == "sheet" for layer in laminate.layers):
         raise DesignError(
             f"{SUPPORTED}; the pockets of {laminate.name} lie on a sheet and need the conforming "
@@ -204,7 +204,7 @@ def round_stack(laminate: Laminate) -> RoundStack:
 
 
 def elastic_of(film: Film, needed_by: str = "a simulation") -> tuple[float, float]:
-    """Young's modulus in MPa and Poisson's ratio. Raises DesignError if they are not known."""
+    """Return Young's modulus in MPa and Poisson's ratio. Raises DesignError if they are unknown."""
     if film.elastic is None:
         raise DesignError(
             f"{needed_by} needs Young's modulus of {film.material}; add "
@@ -214,7 +214,7 @@ def elastic_of(film: Film, needed_by: str = "a simulation") -> tuple[float, floa
 
 
 def pocket_radii(laminate: Laminate) -> list[float]:
-    """Half the least width of every pocket, in mm."""
+    """Return half the least width of every pocket, in mm."""
     radii = []
     for gap in laminate.interfaces:
         if gap.kind == "chamber":
@@ -226,7 +226,7 @@ def pocket_radii(laminate: Laminate) -> list[float]:
 
 
 def why_not_round(laminate: Laminate) -> str | None:
-    """The reason why a laminate has no coarse shell, or None."""
+    """Return the reason why a laminate has no coarse shell, or None."""
     try:
         round_stack(laminate)
     except DesignError as reason:
@@ -252,13 +252,13 @@ def _rim(gap: Interface, axis: Point, pocket: float) -> float:
         x, y = axis
         raise DesignError(
             f"{SUPPORTED}; the outline of layer {gap.above.index} at x {x:.3f}, y {y:.3f} does "
-            "not run round its pocket"
+            "not run around its pocket"
         )
     return radius
 
 
 def _radius_about(contours: Iterable[Contour], axis: Point) -> float | None:
-    """The predominant radius of arcs round an axis; lobes and tabs leave only part of a circle."""
+    """The predominant radius of arcs about an axis; lobes and tabs leave only part of a circle."""
     turned: dict[float, float] = {}
     for edge in (edge for contour in contours for edge in contour.edges):
         if isinstance(edge, Arc) and math.dist(edge.centre, axis) < ON_AXIS:
@@ -309,28 +309,28 @@ class Meridian:
 
     @property
     def run(self) -> float:
-        """Distance from the neck to the edge, seen from above."""
+        """The distance from the neck to the edge in plan view."""
         k = self.slope
         return self.length if k == 0 else 2 * self.length / (math.hypot(1, k) + math.asinh(k) / k)
 
     @property
     def edge(self) -> float:
-        """Radius of the bonded edge, smaller than the flat pocket's."""
+        """The radius of the bonded edge, smaller than the flat pocket's."""
         return self.neck + self.run
 
     @property
     def height(self) -> float:
-        """Height of the neck disc over the edge; a balloon is twice as high."""
+        """The height of the neck disc over the edge; a balloon is twice as high."""
         return self.slope * self.run / 2
 
     @property
     def volume(self) -> float:
-        """Volume of a round balloon with two such films."""
+        """The volume of a round balloon with two such films."""
         run, neck = self.run, self.neck
         return 2 * math.pi * self.height * (neck * neck + 4 * neck * run / 3 + run * run / 2)
 
     def point(self, distance: float) -> tuple[float, float]:
-        """Radius and height of the film ``distance`` along the meridian from the neck."""
+        """Return radius and height of the film at ``distance`` along the meridian from the neck."""
         if self.slope == 0:
             return self.neck + distance, 0.0
         scale = self.run / (2 * self.slope)
@@ -347,7 +347,7 @@ Start = Callable[[float, float], Meridian]
 
 
 def fullest(pocket: float, neck: float) -> Meridian:
-    """The volume limit of the paper's parabola: 16.95 ul in a pocket of 5 mm.
+    """Return the volume limit of the paper's parabola: 16.95 ul in a pocket of 5 mm.
 
     The volume is smaller if a wide neck leaves too little free film.
     """
@@ -357,7 +357,7 @@ def fullest(pocket: float, neck: float) -> Meridian:
 
 
 def nearly_flat(pocket: float, neck: float) -> Meridian:
-    """A balloon that has only just risen."""
+    """Return a balloon that has only just risen."""
     length = pocket - neck
     half = RISE * pocket / 2.5 / 2
     slope = last_positive(lambda k: half - Meridian(neck, length, k).height, 0.0, STEEPEST)
@@ -365,7 +365,7 @@ def nearly_flat(pocket: float, neck: float) -> Meridian:
 
 
 def holding(neck: float, length: float, volume: float) -> Meridian:
-    """The shape with this volume, or the shape with the largest volume."""
+    """Return the shape with this volume, or the shape with the largest volume."""
     most = _holding_most(neck, length).slope
     slope = last_positive(lambda k: volume - Meridian(neck, length, k).volume, 0.0, most)
     return Meridian(neck, length, slope)
@@ -402,7 +402,7 @@ class Web(NamedTuple):
 def web_of(
     lobes: int, axis: float, pocket: float, rim: float, hub: float, lumen: float, sectors: int
 ) -> Web:
-    """The web of a plate; radii in mm: of the chamber axes, pocket, rim, hub and lumen."""
+    """Return the web of a plate; radii in mm: of the chamber axes, pocket, rim, hub and lumen."""
     half, step = math.pi / lobes, math.tau / sectors
     apart = axis * math.sin(half)
     # Midway between two lobes the outline is on the hub, or where they meet.
@@ -426,7 +426,7 @@ def web_of(
 
 
 def _triangulated(corners: Iterable[Point], numbers: dict[Point, int]) -> Triangles:
-    """Delaunay triangles of the polygon with these corners, counter-clockwise, sorted."""
+    """Return Delaunay triangles of the polygon with these corners, counter-clockwise, sorted."""
     import shapely
 
     # Corners on the axis of symmetry must lie on it exactly for the triangulation.
@@ -451,7 +451,7 @@ FILMS = {"bend_lower": 1, "bend_upper": 1, "bend_web": 2, "bend_neck": 2}
 
 
 def node_masses(shell: Shell, film: Film) -> Floats:
-    """True mass (n,) in kg of each node of a coarse shell: a third of each triangle's."""
+    """The true mass (n,) in kg of each node of a coarse shell: a third of each triangle's."""
     masses = np.zeros(len(shell.rest))
     dense = density_of(film, "a simulation")
     for group in shell.bending:
@@ -464,7 +464,7 @@ def node_masses(shell: Shell, film: Film) -> Floats:
 def coarse_shell(
     stack: RoundStack, sectors: int = SECTORS, start: Start = fullest, is_fair: bool = False
 ) -> Shell:
-    """The shell of a stack, inflated to the ``start`` shape of each pocket and neck radius.
+    """Return the shell of a stack, inflated to the ``start`` shape of each pocket and neck radius.
 
     ``sectors`` is the number of nodes per ring. A ring has the area of its circle if ``is_fair``,
     otherwise it is inscribed in the circle.
@@ -556,7 +556,7 @@ class _Builder:
         self.cavities[k].append(triangles)
 
     def _nodes(self, flat: Floats, placed: Floats, z: float) -> Ring:
-        """Numbers of new nodes at flat places (k, 2), raised to others at a height."""
+        """Return numbers of new nodes at flat positions (k, 2), raised to others at a height."""
         self.rest.append(np.column_stack([flat, np.zeros(len(flat))]))
         self.position.append(np.column_stack([placed, np.full(len(placed), z)]))
         self.count += len(flat)
@@ -565,7 +565,7 @@ class _Builder:
     def _ring(
         self, k: int, flat: float, placed: float, z: float, steps: Iterable[int] | None = None
     ) -> Ring:
-        """Nodes round the axis of chamber k, by steps from the lobe's own direction."""
+        """Return nodes around the axis of chamber k, by steps from the lobe's own direction."""
         axis = np.array(self.stack.axes[k])
         out = math.atan2(axis[1], axis[0]) if self.stack.lobes > 1 else 0.0
         numbers = range(self.sectors) if steps is None else steps
@@ -575,7 +575,7 @@ class _Builder:
         return self._nodes(axis + flat * ways, moved + placed * ways, z)
 
     def _round(self, count: int, offset: float, flat: float, placed: float, z: float) -> Ring:
-        """``count`` nodes round the actuator's axis, the first ``offset`` steps past a lobe."""
+        """``count`` nodes around the actuator's axis, the first ``offset`` steps past a lobe."""
         x, y = self.stack.axes[0]
         turns = math.atan2(y, x) + math.tau / count * (np.arange(count) + offset)
         ways = np.column_stack([np.cos(turns), np.sin(turns)])
@@ -589,7 +589,7 @@ class _Builder:
     def _film(
         self, k: int, balloon: int, middle: float, way: int, neck: Ring, edge: Ring
     ) -> Triangles:
-        """A free film from a neck disc to the edge at height ``middle``, above or below it."""
+        """Add a free film from a neck disc to the edge at height ``middle``, above or below it."""
         meridian = self.meridians[balloon]
         steps = max(2, round(meridian.length / (RING_STEP * self.stack.pockets[balloon])))
         rings = [neck]
@@ -627,7 +627,7 @@ class _Builder:
         return np.concatenate(triangles)
 
     def _tip(self, discs: list[list[Ring]]) -> Ring:
-        """The cap's centres; with fewer than three, points of its neck rims."""
+        """Return the cap's centres; with fewer than three, points of its neck rims."""
         quarter = self.sectors // 4
         if len(discs) >= 3:
             return np.array([rings[0][0] for rings in discs])
@@ -637,14 +637,14 @@ class _Builder:
 
 
 def _cap(rings: list[Ring]) -> Triangles:
-    """Triangles of a closed neck disc, seen counter-clockwise from above."""
+    """Add triangles of a closed neck disc, seen counter-clockwise from above."""
     (centre,), bore, neck = rings
     fan = np.column_stack([bore, np.roll(bore, -1), np.full(len(bore), centre)])
     return np.concatenate([fan, annulus(bore, neck)])
 
 
 def annulus(inner: Ring, outer: Ring) -> Triangles:
-    """Triangles between two rings, seen counter-clockwise from above.
+    """Return triangles between two rings, seen counter-clockwise from above.
 
     Diagonals alternate, so that the mesh has no handedness that would twist the actuator. The first
     edges of triangles, which set the axes of corotational elements, alternate too.
@@ -656,5 +656,5 @@ def annulus(inner: Ring, outer: Ring) -> Triangles:
 
 
 def reverse(triangles: Triangles) -> Triangles:
-    """Return the triangles seen from the other side, beginning with the same edge."""
+    """Return the triangles seen from the other side, starting with the same edge."""
     return triangles[:, [1, 0, 2]]

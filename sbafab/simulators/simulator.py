@@ -130,7 +130,7 @@ class State(Document):
 
     Pressures are kPa (a vacuum is negative), empty if volumes are imposed; volumes are ul, empty if
     they were not recorded. Lengths are mm, with films as thick as bought; the tilt is in degrees.
-    Height, tip and tilt are None round a tube, and the tilt is also None if the tip has only one
+    Height, tip and tilt are None around a tube, and the tilt is also None if the tip has only one
     axis.
     """
 
@@ -153,14 +153,15 @@ class State(Document):
 
     @property
     def stroke(self) -> float:
-        """Growth in height in mm."""
+        """The increase in height in mm."""
         return 0.0 if self.tip is None else self.tip[2]
 
 
 class Result(State, schema="sbafab/simulate@2"):
-    """Result of a run, and the contents of ``result.json``: the last state, then all ``states``.
+    """The result of a run, and the contents of ``result.json``: the last state, then all
+    ``states``.
 
-    ``figures`` are what only some simulators give (mm, ul, MPa, uJ or steps/s). If a run ended
+    ``figures`` are results of only some simulators (mm, ul, MPa, uJ or steps/s). If a run ended
     early, the results up to then are valid, and ``stopped`` is one sentence. Only the units are
     given if nothing has run.
     """
@@ -201,7 +202,7 @@ class Result(State, schema="sbafab/simulate@2"):
 
     @property
     def figures(self) -> dict[str, float]:
-        """The results that this simulator gives, by name of ``FIGURES``."""
+        """The results of this simulator, by name of ``FIGURES``."""
         return {name: getattr(self, name) for name in FIGURES if name in self.model_fields_set}
 
     @property
@@ -222,7 +223,7 @@ class Simulator(Protocol):
     USES: tuple[str, ...]
 
     def why_not(self, laminate: Laminate) -> str | None:
-        """Return the reason why no input can be made for a laminate, or None."""
+        """Return the reason why a laminate has no input for it, or None."""
 
     def export(self, laminate: Laminate, request: SimulationRequest, folder: Path) -> None:
         """Write the simulator's input, and every file that it loads, into a folder that exists."""
@@ -234,35 +235,37 @@ class Simulator(Protocol):
 
 
 def simulator(name: str) -> Simulator:
-    """Return the simulator of that name; its imports are loaded only now. Raises DesignError."""
+    """Return the simulator of that name, with its imports loaded only now. Raises DesignError."""
     if name not in NAMES:
         raise DesignError(f'simulator = "{name}" must be one of {", ".join(NAMES)}')
     return cast(Simulator, SIMULATORS[name])
 
 
 def refuse_unused(name: str, request: SimulationRequest) -> None:
-    """Raises DesignError for an unknown simulator, and for a setting that it does not use."""
+    """Raise DesignError for an unknown simulator, and for a setting that it does not use."""
     uses = {each_name: simulator(each_name).USES for each_name in dict.fromkeys((name, *NAMES))}
     for setting in sorted({each for used in uses.values() for each in used}):
         if getattr(request, setting) not in (None, {}) and setting not in uses[name]:
             users = [each_name for each_name in NAMES if setting in uses[each_name]]
-            raise DesignError(f"{setting} is for {' and '.join(users)}; leave it out with {name}")
+            raise DesignError(f"{setting} is for {' and '.join(users)}; omit it with {name}")
 
 
 def under_vacuum(name: str, request: SimulationRequest) -> SimulationRequest:
-    """Return the request for a design that works under a vacuum, by default one of ``VACUUM``.
+    """Return the request for a design that works under vacuum, by default one of ``VACUUM``.
 
-    Raises DesignError for a pressure above 0, and for a simulator that takes no vacuum.
+    Raises DesignError for a positive pressure, and for a simulator without vacuum.
     """
     if name != "calculix":
-        raise DesignError(f"the design works under a vacuum, and {name} takes none; take calculix")
+        raise DesignError(
+            f"the design works under vacuum, which {name} does not support; use calculix"
+        )
     pressures = {"pressure": request.pressure or 0.0}
     pressures |= {f"pressure of {chamber}": kpa for chamber, kpa in request.chambers.items()}
     for label, kpa in pressures.items():
         if kpa > 0:
             raise DesignError(
-                f"{label} = {kpa:g} kPa is out of range; give {-LARGEST_VACUUM:g} to 0 kPa, as a "
-                f"gauge shows it; a vacuum is negative: write {-kpa:g}"
+                f"{label} = {kpa:g} kPa is out of range; give {-LARGEST_VACUUM:g} to 0 kPa "
+                f"gauge; a vacuum is negative: write {-kpa:g}"
             )
     if request.pressure is None and not request.chambers:
         return replace(request, pressure=VACUUM)
@@ -272,15 +275,13 @@ def under_vacuum(name: str, request: SimulationRequest) -> SimulationRequest:
 def chamber_pressures(
     names: Sequence[str], request: SimulationRequest, default: float, least: float = 0.0
 ) -> dict[str, float]:
-    """Return the pressure in kPa of every chamber: named, ``request.pressure`` elsewhere.
+    """Return the pressure in kPa of every chamber: by name, otherwise ``request.pressure``.
 
     Without a request every chamber has the ``default``; if only single chambers are given, the
     others have 0. Raises DesignError for an unknown chamber and a pressure out of range.
     """
     if not names:
-        raise DesignError(
-            "the design has no chamber, and a simulation fills chambers; add chambers to it"
-        )
+        raise DesignError("the design has no chamber to fill; add chambers to it")
     refuse_unknown(names, request.chambers, "pressure")
     in_all = (
         (0.0 if request.chambers else default) if request.pressure is None else request.pressure
@@ -294,12 +295,12 @@ def chamber_pressures(
                 f"kPa{hint}"
             )
     if not any(pressures.values()):
-        raise DesignError("pressure is 0 kPa in every chamber; give one of them more")
+        raise DesignError("pressure is 0 kPa in every chamber; increase at least one")
     return pressures
 
 
 def refuse_time(seconds: float, least: float) -> None:
-    """Raises DesignError for a simulated time out of range."""
+    """Raise DesignError for a simulated time out of range."""
     if not least <= seconds <= LONGEST:
         raise DesignError(
             f"simulated time = {seconds:g} s must lie between {least:g} and {LONGEST:g} s"
@@ -307,12 +308,12 @@ def refuse_time(seconds: float, least: float) -> None:
 
 
 def refuse_unknown(names: Sequence[str], requested: Mapping[str, float], quantity: str) -> None:
-    """Raises DesignError for an unknown chamber."""
+    """Raise DesignError for an unknown chamber."""
     unknown = next((name for name in requested if name not in names), None)
     if unknown is not None:
         raise DesignError(
-            f"{quantity} names chamber {unknown}, which is not there; "
-            f"the chambers are {', '.join(names)}"
+            f"{quantity} names chamber {unknown}, which does not exist; the chambers are "
+            f"{', '.join(names)}"
         )
 
 
@@ -340,8 +341,8 @@ def impossible(
     """Return why a state of a laminate is impossible, or None.
 
     A balloon's height cannot exceed the length of its two films, and a laminate on a tube has no
-    common tip. Equal pressures or volumes, if ``requested`` of all chambers, lift a plate evenly if
-    the mesh has no inlets. ``passed`` is the ``overlap`` in ul.
+    common tip. Equal pressures or volumes, if ``requested`` for all chambers, lift a plate evenly
+    if the mesh has no inlets. ``passed`` is the ``overlap`` in ul.
     """
     return next(_wrong(laminate, state, requested, passed), None)
 
@@ -380,7 +381,7 @@ def _wrong(
 
 
 def overlap(points: Floats, flat: Floats, start: Floats, triangles: Ints) -> float:
-    """Return the volume in ul in which films have passed through the films that lay on them.
+    """Return the volume in ul in which films have passed through the films on which they lay.
 
     ``points``, ``flat`` and ``start`` are the positions (n, 3) of nodes at the end, when all films
     lie on each other, and in the order of the films; ``triangles`` (k, 3) are all films. Nodes that
@@ -425,14 +426,14 @@ STOP_WITHIN = 10.0
 
 
 class Stop(NamedTuple):
-    """Why a program ended early: interrupted, timed out, diverged, or failed."""
+    """The reason why a program ended early: interrupted, timed out, diverged, or failed."""
 
     kind: Literal["interrupt", "time", "diverged", "failed"]
     words: str
 
 
 def program_path(name: str, install: str) -> str:
-    """Path of an installed program. Raises OutputError with instructions to ``install`` it."""
+    """The path of an installed program. Raises OutputError with instructions to ``install`` it."""
     path = shutil.which(name)
     if path is None:
         raise OutputError(f"{name} was not found; {install}")
@@ -444,9 +445,9 @@ def run_program(
 ) -> tuple[int, Stop | None]:
     """Run a command in the folder of its ``log``, which receives its output.
 
-    ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM
-    stop the run, not the program that started it, so that partial results can be kept. One
-    thread, unless OMP_NUM_THREADS says otherwise. Return its exit code, and why it was stopped.
+    ``look`` is called while it runs; after ``limit`` seconds it is stopped. Ctrl-C and SIGTERM stop
+    the run, not the program that started it, so that partial results can be kept. It uses one
+    thread unless OMP_NUM_THREADS is set. Return its exit code, and the reason if it was stopped.
     Raises OutputError if it cannot be started.
     """
     began = time.monotonic()
@@ -465,8 +466,8 @@ def run_program(
             )
         except OSError as reason:
             raise OutputError(
-                f"{command[0]} could not be started ({reason.strerror}); see whether it is a "
-                "program that runs on this machine"
+                f"{command[0]} could not be started ({reason.strerror}); check that it is a "
+                "program for this machine"
             ) from reason
         try:
             while stopped is None:
@@ -486,7 +487,7 @@ def run_program(
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Ends the program and its child processes."""
+    """End the program and its child processes."""
     for number in (signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)):
         if process.poll() is not None:
             return
@@ -512,11 +513,7 @@ RAMP = 1.0
 
 @dataclass(frozen=True, eq=False)
 class RecordedFilms:
-    """The shell of a laminate whose nodes are recorded, from which its motion is read.
-
-    The mean of the ``middle`` nodes is the tip. ``pressures`` are kPa by chamber at the end, empty
-    with volumes; ``requested`` are the pressures or volumes of all chambers.
-    """
+    """The shell of a laminate with recorded nodes, from which its motion is read."""
 
     laminate: Laminate
     shell: Shell
@@ -525,7 +522,7 @@ class RecordedFilms:
     requested: Collection[float]
 
     def state(self, time: float, nodes: Floats) -> State:
-        """The state at a time in s, with the nodes (n, 3) in mm."""
+        """Return the state at a time in s, with the nodes (n, 3) in mm."""
         on, shell = min(1.0, time / RAMP), self.shell
         pressures = {name: on * value for name, value in self.pressures.items()}
         volumes = {name: shell.volume(name, nodes) for name in shell.cavities}
@@ -546,7 +543,7 @@ class RecordedFilms:
         )
 
     def figures(self, states: Sequence[State], nodes: Floats) -> dict[str, float]:
-        """Figures of a run by name of ``FIGURES``, from its states and its last nodes."""
+        """Return figures of a run by name of ``FIGURES``, from its states and its last nodes."""
         shell = self.shell
         passed = {"overlap": overlap(nodes, shell.rest, shell.position, shell.triangles)}
         if self.laminate.tube is None:
@@ -557,7 +554,8 @@ class RecordedFilms:
 
 
 def read_nodes(path: Path) -> list[tuple[float, Floats]]:
-    """Times in s and places (n, 3) in mm of recorded nodes, in the format of SOFA's WriteState.
+    """Return times in s and positions (n, 3) in mm of recorded nodes, in the format of SOFA's
+    WriteState.
 
     They end before the first record that is truncated or not finite.
     """
@@ -597,8 +595,8 @@ def run_model(
     """Run a model and judge its nodes; ``times`` are simulated seconds, and at most real minutes.
 
     ``command`` runs it in its folder and records its nodes in ``NODES_FILE`` every ``PERIOD``. Its
-    log stays beside it. Raises VoidError if it ends by itself, is killed, logs an error or has
-    an impossible result; the message says how far the tip was known.
+    log is kept beside it. Raises VoidError if it ends prematurely, is killed, logs an error or has
+    an impossible result; the message states the last known tip.
     """
     folder, name, (seconds, minutes) = model.parent, model.name, times
     program = Path(command[0]).name if simulator == "sofa" else simulator
@@ -622,13 +620,13 @@ def run_model(
     is_cut_short = stopped is not None and bool(records) and trouble is None
     if why and not is_cut_short:
         known = f"the tip is known to {records[-1][0]:g} s" if records else "nothing is known of it"
-        raise VoidError(f"{name} did not run to its end: {why}; {known} (see {log})")
+        raise VoidError(f"{name} ended prematurely: {why}; {known} (see {log})")
     states = tuple(films.state(*each) for each in records)
     figures = films.figures(states, records[-1][1])
     last, passed = states[-1], figures.get("overlap", 0.0)
     wrong = impossible(films.laminate, last, films.requested, passed)
     if wrong is not None:
-        raise VoidError(f"{name} ran to {last.time:g} s, but its result cannot be: {wrong}")
+        raise VoidError(f"{name} ran to {last.time:g} s, but its result is impossible: {wrong}")
     record.unlink()
     if stopped is not None:
         reached = f"{name} ran to {last.time:g} of {seconds:g} s: {stopped.words}"
@@ -638,7 +636,7 @@ def run_model(
 
 
 def _why_void(program: str, code: int, trouble: str | None) -> str:
-    """Return the reason why a program that was not stopped has failed; empty if it has not."""
+    """Return the reason why a program that was not stopped has failed; empty if it succeeded."""
     if code < 0:
         return f"{program} was killed by signal {-code} ({signal.Signals(-code).name})"
     if trouble is not None:
@@ -647,8 +645,8 @@ def _why_void(program: str, code: int, trouble: str | None) -> str:
 
 
 def tilt_of(flat: Floats, points: Floats) -> float | None:
-    """Return the angle in degrees by which the plane of points (n, 3) has turned since they were
-    ``flat``; None of fewer than three.
+    """Return the angle in degrees by which the plane of points (n, 3) has rotated from ``flat``;
+    None for fewer than three.
     """
     if len(points) < 3:
         return None
@@ -673,7 +671,7 @@ def model_file(
     finish: Callable[[ET.Element], None] = lambda root: None,
     **values: object,
 ) -> str:
-    """Return a file of XML that begins with a comment, from a template and its values.
+    """Return an XML file with a leading comment, from a template and its values.
 
     ``name`` is the actuator's, in the comment as ``title``; ``finish`` may change the elements.
     """
@@ -705,7 +703,7 @@ def _environment() -> Environment:
 
 
 def numbers(values: ArrayLike) -> str:
-    """Format numbers with nine digits, spaces between them, and no minus before a zero."""
+    """Return numbers with nine digits, separated by spaces, without a minus sign before zero."""
     return " ".join([f"{value + 0.0:.9g}" for value in np.ravel(values).tolist()])
 
 

@@ -1,4 +1,4 @@
-"""SOFA: the films of an actuator, its three scenes from templates, and a scene run with runSofa."""
+"""SOFA: the films of an actuator, its three scenes from templates, and their run with runSofa."""
 
 from __future__ import annotations
 
@@ -64,12 +64,12 @@ COARSE_SECTORS = 8
 
 
 def half_full(pocket: float, neck: float) -> Meridian:
-    """7.5 ul in a pocket of 5 mm: 80 ul more brings 15 balloons near their volume at 5 kPa."""
+    """The shape at 7.5 ul in a pocket of 5 mm; 15 balloons then reach 5 kPa with 80 ul more."""
     return holding(neck, pocket - neck, 7.5 * (pocket / 2.5) ** 3)
 
 
 def round_shell(stack: RoundStack, sectors: int = SECTORS, start: Start = nearly_flat) -> Shell:
-    """The shell of a stack of round pockets; its rings have the area of the circles."""
+    """Return the shell of a stack of round pockets; its rings have the area of the circles."""
     return coarse_shell(stack, sectors, start, is_fair=True)
 
 
@@ -81,9 +81,9 @@ STEPS_ACROSS = 3.0
 
 
 def conforming_shell(laminate: Laminate) -> Shell:
-    """The shell of a laminate, flat at the start; a radial one is wrapped round its tube.
+    """Return the shell of a laminate, initially flat; a radial one is wrapped around its tube.
 
-    The mouths of inlets are open and free. Raises DesignError if a film's modulus is not known, or
+    The mouths of inlets are open and free. Raises DesignError if a film's modulus is unknown, or
     the mesher is not installed.
     """
     for layer in laminate.tpe_layers:
@@ -172,7 +172,7 @@ def _films(
 def _kinds(
     corners: Triangles, *properties: Floats
 ) -> Iterator[tuple[Triangles, tuple[float, ...]]]:
-    """Yield the triangles with equal properties, and these."""
+    """Yield the triangles with equal properties, and these properties."""
     rows = np.column_stack(properties).round(12)
     kinds, kind = np.unique(rows, axis=0, return_inverse=True)
     for n, values in enumerate(kinds.tolist()):
@@ -180,7 +180,7 @@ def _kinds(
 
 
 def _marks(stack: Layup, mesh: Mesh, number: Ints) -> list[int]:
-    """Nodes of the highest film: the axes of three stacks or more, or four round its middle."""
+    """Nodes of the highest film: the axes of three or more stacks, or four around its middle."""
     top = mesh.node_sets["tip"]
     top = top[number[top] >= 0]
     places = mesh.points[top][:, :2]
@@ -236,7 +236,7 @@ class Scene:
         return "actuator.scn" if self.name == "shell" else f"actuator_{self.name}.scn"
 
     def text(self, record: bool = False) -> str:
-        """The scene as a file, with a record of all nodes of its films if ``record``."""
+        """Return the scene as a file, with a record of all nodes of its films if ``record``."""
         films = self.films
         values = {"dt": self.dt, "ramp": RAMP, "period": PERIOD, "nodes_file": NODES_FILE}
         values |= {"shell": films.shell, "pressures": films.pressures, "record": record}
@@ -266,18 +266,18 @@ VOLUME_PRESSURE = 10.0
 
 
 def nodal_stiffness(highest: float, size: float) -> float:
-    """Nodal mass / dt^2 in mN/mm at which a shell under a pressure in kPa is stable."""
+    """Return nodal mass / dt^2 in mN/mm at which a shell under a pressure in kPa is stable."""
     return max(LEAST_NODAL, NODAL_BY_PRESSURE * highest * size)
 
 
 def _mass(shell: Shell, highest: float) -> dict[str, float]:
-    """An artificial mass in kg, which keeps a shell stable under the highest pressure in kPa."""
+    """The artificial mass in kg that stabilises a shell under the highest pressure in kPa."""
     mass = nodal_stiffness(highest, shell.size) * len(shell.rest) * DT**2
     return {"highest": highest, "mass": mass}
 
 
 def usual_volume(stack: RoundStack) -> float:
-    """Volume in ul above the start to which a chamber is filled if no volumes are given."""
+    """Return the default volume in ul above the start of a chamber."""
     return float(f"{VOLUME * stack.balloons / 15 * stack.size**3:.3g}")
 
 
@@ -289,7 +289,7 @@ def imposed_volumes(stack: RoundStack, volumes: Mapping[str, float] | None) -> d
     for name, value in volumes.items():
         if not 0 <= value < math.inf:
             raise DesignError(
-                f"volume of {name} = {value:g} ul must be 0 or more; vacuum has not been tried"
+                f"volume of {name} = {value:g} ul must be at least 0; vacuum is untested"
             )
     return {name: volumes.get(name, 0.0) for name in stack.chambers}
 
@@ -315,7 +315,7 @@ def _framed(stack: RoundStack, shell: Shell) -> dict[str, object]:
 def pair_of_frames(
     z: float, height: float, frames: int = FRAMES
 ) -> tuple[tuple[int, int], tuple[float, float]]:
-    """The two frames next to a height and their weights, the nearer one first.
+    """Return the two frames next to a height and their weights, the nearer one first.
 
     SkinningMapping reads a node's weights up to the first 0, so a 0 must come last.
     """
@@ -333,10 +333,10 @@ def pair_of_frames(
 def scenes_of(
     laminate: Laminate, pressures: Mapping[str, float], volumes: Mapping[str, float] | None = None
 ) -> dict[str, Scene]:
-    """The scenes of a laminate by name, the default one first.
+    """Return the scenes of a laminate by name, the default one first.
 
     ``pressures`` in kPa by chamber; ``volumes`` (scene C, above its start) in ul by chamber, 0 for
-    omitted ones, by default some 80 ul in each. Scenes B and C require round pockets of one film.
+    omitted ones, by default about 80 ul in each. Scenes B and C require round pockets of one film.
     Raises DesignError if a chamber is unknown, or if other pockets need a mesher that is not
     installed.
     """
@@ -404,7 +404,7 @@ USES = ("scene", "seconds", "volumes")
 
 
 def why_not(laminate: Laminate) -> str | None:
-    """Return why no scene can be made: the modulus of a film is not known."""
+    """Return why no scene can be made: the modulus of a film is unknown."""
     try:
         for layer in laminate.tpe_layers:
             elastic_of(layer.film)
@@ -430,13 +430,13 @@ def run(laminate: Laminate, request: SimulationRequest, folder: Path, progress: 
     missing, VoidError if the result is invalid.
     """
     if request.volumes and request.scene != "volume":
-        raise DesignError("--volume is for --scene volume; the other scenes are told pressures")
+        raise DesignError("--volume is for --scene volume; the other scenes use pressures")
     scenes = export(laminate, request, folder)
     scene = scenes.get(request.scene or "shell")
     if scene is None:
         raise DesignError(
             f"scene {request.scene} is for round pockets of one film: {why_not_round(laminate)}; "
-            "take scene shell"
+            "use scene shell"
         )
     program = program_path(
         "runSofa",
@@ -473,7 +473,7 @@ DONE = re.compile(r"iterations done in \S+ s \(\s*(\S+) FPS\s*\)")
 
 
 def read_log(text: str, plugins: list[str]) -> tuple[str | None, float | None]:
-    """The first error of a run whose scene needs these plugins, and its steps per s.
+    """Return the first error of a run whose scene needs these plugins, and its steps per s.
 
     Other plugins may be missing.
     """

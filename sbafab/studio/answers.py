@@ -37,13 +37,13 @@ def of(record: object, *names: str) -> dict[str, Any]:
 
 @dataclass
 class AnswerShapes:
-    """The shapes of one answer; shapes that the page ``has`` are only named."""
+    """The shapes of one answer; shapes that the page already ``has`` are only named."""
 
     has: Collection[str]
     new: dict[str, list[list[float]]] = field(default_factory=dict)
 
     def key(self, region: Region) -> str:
-        """The name of a region, which is sent along if the page lacks it."""
+        """Return the name of a region, and add the region if the page lacks it."""
         key = region.key[:24]
         if key not in self.has and key not in self.new:
             self.new[key] = [flat(contour.vertices) for contour in region.contours]
@@ -51,7 +51,7 @@ class AnswerShapes:
 
 
 def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
-    """A contour as the page reads it; its bulges are exact enough to write arcs back to a
+    """Return a contour in the page's format; its bulges are exact enough to write arcs back to a
     design.
     """
     rounded = ((round(x, 6), round(y, 6), round(bulge, 12)) for x, y, bulge in vertices)
@@ -59,7 +59,7 @@ def flat(vertices: Iterable[tuple[float, float, float]]) -> list[float]:
 
 
 def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
-    """Layers, patterns and their positions; plan, section and solid are drawn from it."""
+    """Return layers, patterns and positions, from which plan, section and solid are drawn."""
     shapes = AnswerShapes(has)
     patterns = {
         name: {
@@ -92,7 +92,7 @@ def laminate_model(laminate: Laminate, has: Collection[str]) -> dict[str, Any]:
 
 
 def shapes_model(drawn: Mapping[str, Region | None], has: Collection[str]) -> dict[str, Any]:
-    """The shapes that a design file names, each with the key of its region or None."""
+    """Return the named shapes of a design file, each with the key of its region or None."""
     shapes = AnswerShapes(has)
     named = {name: region and shapes.key(region) for name, region in drawn.items()}
     return {"kind": "shapes", "named": named, "shapes": shapes.new}
@@ -127,7 +127,7 @@ def nets_model(laminate: Laminate, nets: NetMap, has: Collection[str]) -> dict[s
 
 
 def finding_model(finding: Finding) -> dict[str, Any]:
-    """A finding as in ``checks.json``, its design, whose name the message omits, and its parts."""
+    """A finding as in ``checks.json``, its design (whose name the message omits) and its parts."""
     entry = FindingEntry.of(replace(finding, design=""))
     design = {"design": finding.design} if finding.design else {}
     return {**entry, **design, **of(finding, "by_user", "parts")}
@@ -141,7 +141,7 @@ PLACED_BY = {"on", "at", "angle", "along", "offset", "glue", "note", "design", "
 
 
 def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
-    """Parts with their places, in order of support, and surfaces that the page lacks."""
+    """Return parts with their places, in order of support, and surfaces that the page lacks."""
     surfaces: dict[str, dict[str, str]] = {}
     parts = []
     for placed in assembled.parts:
@@ -158,7 +158,7 @@ def parts_model(assembled: Assembled, has: Collection[str]) -> dict[str, Any]:
 
 
 def _key(placed: PlacedPart) -> str:
-    """Names a surface by everything that determines it."""
+    """Return a key for a surface, from everything that determines it."""
     decisive: list[Any] = [placed.turn, placed.radius]
     if placed.made is None:
         decisive.append(placed.part.model_dump(mode="json", exclude=PLACED_BY))
@@ -171,7 +171,7 @@ def _key(placed: PlacedPart) -> str:
 
 
 def remembered(cache: dict[str, Kept], key: str, make: Callable[[], Kept], most: int) -> Kept:
-    """Return the value of a key, made if it is missing; the oldest of over ``most`` is dropped."""
+    """Return the cached value of a key, computed if missing; at most ``most`` values are kept."""
     if key not in cache:
         cache[key] = make()
         while len(cache) > most:
@@ -180,7 +180,7 @@ def remembered(cache: dict[str, Kept], key: str, make: Callable[[], Kept], most:
 
 
 def packed(surface: Surface) -> dict[str, str]:
-    """Points and faces of a surface as the page unpacks them."""
+    """Return points and faces of a surface in the page's packed format."""
     arrays = {"points": surface.points.astype("<f4"), "faces": surface.faces.astype("<u4")}
     return {name: base64.b64encode(rows.tobytes()).decode() for name, rows in arrays.items()}
 
@@ -218,8 +218,8 @@ def stack_model(name: str, stack: Stack) -> dict[str, Any]:
 
 
 def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The requested pose; with ``curves``, also the poses on the way to it, as lists of figures,
-    and whether the balloons' maps are valid for it.
+    """Return the requested pose; with ``curves`` also the poses toward it, as lists of figures, and
+    whether the balloons' maps are valid for it.
 
     Raises DesignError beyond the model's range.
     """
@@ -243,16 +243,16 @@ def poses(stack: Stack, request: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 
 class Filling:
-    """A motion through the tubes of one tab: the state from which its next step starts."""
+    """Motion driven through the tubes of one tab: the state at the start of its next step."""
 
     def __init__(self) -> None:
         self.setting: tuple[object, ...] = ()
         self.motion: Motion | None = None
 
     def step(self, stack: Stack, request: dict[str, Any]) -> dict[str, Any]:
-        """The pose after ``dt`` s, with pressures in kPa at the valves. Raises DesignError.
+        """Return the pose after ``dt`` s, with pressures in kPa at the valves. Raises DesignError.
 
-        It restarts, vented, with another stack, tube or load, or on ``restart``.
+        It restarts, vented, for another stack, tube or load, or on ``restart``.
         """
         tube = request["tube"] if isinstance(request.get("tube"), dict) else {}
         pressures = finite_numbers(request.get("pressures"), stack.chambers, "pressures")
@@ -269,7 +269,7 @@ class Filling:
 
 
 def _loads(request: dict[str, Any]) -> dict[str, Any]:
-    """Return the loads on the tip: a pull, weight, an outer plate."""
+    """Return the loads on the tip: pull, weight, outer plate."""
     load = finite_numbers(request.get("load") or [0, 0, 0], 3, "load")
     size = math.hypot(*load)
     if size > MOST_LOAD:
@@ -304,7 +304,7 @@ def finite_numbers(values: Any, count: int, name: str) -> list[float]:
 
 
 def numbers(values: Any) -> Any:
-    """Nested lists with five decimals: 10 nm."""
+    """Return nested lists rounded to five decimals: 10 nm."""
     if hasattr(values, "tolist"):
         values = values.tolist()
     if isinstance(values, Sequence):
@@ -355,7 +355,7 @@ def movers(assembled: Assembled) -> Iterator[dict[str, Any]]:
 
 
 def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
-    """The pose of each actuator with requested pressures in kPa. Raises DesignError."""
+    """Return the pose of each actuator with requested pressures in kPa. Raises DesignError."""
     pressures_of = request["parts"] if isinstance(request["parts"], dict) else {}
     poses_of = {}
     for placed in assembled.parts:
@@ -370,7 +370,7 @@ def part_poses(assembled: Assembled, request: dict[str, Any]) -> dict[str, Any]:
 def whole_prediction(
     assembled: Assembled, request: dict[str, Any], pause: Callable[[], None]
 ) -> dict[str, Any]:
-    """The figures of ``sbafab predict`` for an assembly, in the form of a design's prediction."""
+    """The figures of ``sbafab predict`` for an assembly, in the format of a design's prediction."""
     pressure = _within(request.get("pressure_kpa", PRESSURE_KPA), MOST_PRESSURE, "pressure", "kPa")
     load = _within(request.get("load_g", LOAD_G), MOST_LOAD_G, "mass at the tips", "g")
     if pressure == 0:

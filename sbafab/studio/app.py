@@ -1,9 +1,9 @@
 """The studio's web server: guard, routes, links with designs, and its start.
 
-It listens on this machine only; at another address of it, if requested, it serves only the record
-page to a phone. A page of another site cannot read its answers: Host must be this machine by number
-or name (so a rebound name is refused), Origin must be its own, and every route on designs needs the
-link's token in a header, which no form or image can send.
+It listens only on this machine; at another of its addresses, if requested, it serves only the
+record page to a phone. A page of another site cannot read its answers: Host must be this machine by
+number or name (so a rebound name is refused), Origin must be its own, and every route for designs
+requires the link's token in a header, which no form or image can send.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ MADE_POLICY = (
 
 
 class Guard:
-    """Refuses requests of other sites, and tells the browser what a page may load."""
+    """Refuses requests from other sites, and restricts what a page may load."""
 
     def __init__(self, app: ASGIApp, token: str, address: str = ADDRESS) -> None:
         self.app, self.token = app, token.encode()
@@ -114,7 +114,7 @@ MOST = 1_000_000
 
 
 def design_in(link: str) -> str:
-    """The design's text in a link. Raises DesignError if there is none."""
+    """Return the design text in a link. Raises DesignError if there is none."""
     packed = parse_qs(link.partition("#")[2]).get("design", [""])[0]
     try:
         raw = base64.b64decode(packed + "=" * (-len(packed) % 4), b"-_", validate=True)
@@ -124,9 +124,7 @@ def design_in(link: str) -> str:
             raise ValueError("cut off")
         return text.decode("utf-8")
     except (ValueError, binascii.Error, zlib.error):
-        raise DesignError(
-            "the link holds no design; copy it whole, up to its last letter"
-        ) from None
+        raise DesignError("the link holds no design; copy the complete link") from None
 
 
 # The studio's routes.
@@ -141,7 +139,7 @@ MOST_MADE = 6  # number of run folders kept; the oldest is deleted first
 
 @dataclass
 class Studio:
-    """State that the routes share: folder, initial design, workers and folders of runs."""
+    """State shared by the routes: folder, initial design, workers and folders of runs."""
 
     folder: Path
     token: str
@@ -171,7 +169,7 @@ class Studio:
 
 
 def app(studio: Studio) -> Starlette:
-    """The application; every request passes the guard first."""
+    """Return the application; every request passes the guard first."""
     editing = [
         Route("/api/start", start),
         Route("/api/template/{name}", template),
@@ -369,7 +367,7 @@ def _stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
     """Store the filled entries, all or none, and return their numbers and warnings."""
     lines = request.get("entries")
     if not isinstance(lines, list) or not lines or not all(isinstance(x, dict) for x in lines):
-        raise DesignError("no line is filled in; fill in a reading, a lot, a decision or a note")
+        raise DesignError("nothing is filled in; enter a reading, a lot, a decision or a note")
     entries = api.record_history(
         _recorded_design(folder, request),
         entries=[_entry(line) for line in lines],
@@ -386,7 +384,7 @@ def _stored(folder: Path, request: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _recorded_design(folder: Path, request: Mapping[str, Any]) -> str | Path:
-    """Return the template or the file of the folder that a request names. Raises DesignError."""
+    """Return the template or the file of the folder named in a request. Raises DesignError."""
     name = str(request.get("design", ""))
     if name in api.templates():
         return name
@@ -396,14 +394,14 @@ def _recorded_design(folder: Path, request: Mapping[str, Any]) -> str | Path:
 
 
 def _entry(line: Mapping[str, Any]) -> dict[str, Any]:
-    """Return an entry with its photograph as bytes: a page cannot name files of this machine."""
+    """An entry with its photograph as bytes, since a page cannot name files of this machine."""
     values = {str(name): value for name, value in line.items() if name != "photograph"}
     packed = line.get("photograph")
     if packed:
         try:
             values["photograph"] = base64.b64decode(str(packed), validate=True)
         except (binascii.Error, ValueError):
-            raise DesignError("the photograph did not arrive whole; send it again") from None
+            raise DesignError("the photograph arrived incomplete; send it again") from None
     return values
 
 
@@ -438,7 +436,7 @@ def opened(source: str | None) -> tuple[Path, dict[str, str]]:
 
 
 def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
-    """A socket at an address of this machine, at the given port or, by default, a free one."""
+    """Return a listening socket at an address of this machine, on the given or a free port."""
     for number in (PORT, 0) if port is None else (port,):
         # asyncio sends small answers at once only for sockets with a named protocol; others wait 40
         # ms for the browser to acknowledge the previous data.
@@ -454,16 +452,16 @@ def listening(port: int | None, address: str = ADDRESS) -> socket.socket:
             reason = error.strerror
     if address != ADDRESS:
         raise OutputError(
-            f"{address} cannot be listened on ({reason}); give this machine's address in the "
-            "network that the phone is in, such as 192.168.1.20"
+            f"{address} cannot be used ({reason}); give this machine's address on the phone's "
+            "network, such as 192.168.1.20"
         )
-    raise OutputError(f"port {port} cannot be used ({reason}); leave out --port to take a free one")
+    raise OutputError(f"port {port} cannot be used ({reason}); omit --port to use a free one")
 
 
 def serve(
     source: str | None, port: int | None, announce: Callable[[str], None], address: str = ADDRESS
 ) -> None:
-    """Serves the studio until Ctrl-C; ``announce`` gets the link.
+    """Serve the studio until Ctrl-C; ``announce`` receives the link.
 
     At another ``address`` of this machine it serves only the record page. Raises DesignError,
     OutputError, and Stopped at the end.

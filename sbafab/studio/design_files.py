@@ -1,4 +1,4 @@
-"""Design files in the chosen folder, the files that they name, and folders of runs."""
+"""Design files in the chosen folder, the files they reference, and folders of runs."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ class ChangedError(OutputError):
 
 
 def design_file(folder: Path, name: str) -> Path:
-    """The design file of this name in the folder. Raises DesignError for any other place."""
+    """Return the design file of this name in the folder. Raises DesignError for any other place."""
     size = len(os.fsencode(name))
     if size > MOST_NAME:
         raise DesignError(
-            f"the name {name[:20]}... has {size} bytes, of a design file at most {MOST_NAME}; "
-            "shorten it"
+            f"the name {name[:20]}... has {size} bytes; the limit for a design file is "
+            f"{MOST_NAME}; shorten it"
         )
     path = folder / name
     if not name.endswith(".toml") or "\0" in name or not _lies_in(path, folder):
@@ -44,13 +44,13 @@ def design_file(folder: Path, name: str) -> Path:
 
 
 def listed(folder: Path) -> list[str]:
-    """Names of the design files directly in the folder."""
+    """Return the names of the design files directly in the folder."""
     files = (path for path in folder.glob("*.toml") if _lies_in(path, folder) and path.is_file())
     return sorted(path.name for path in files)[:MOST_LISTED]
 
 
 def read(path: Path) -> tuple[str, str]:
-    """Text and hash of a design file. Raises DesignError if it cannot be read."""
+    """Return text and hash of a design file. Raises DesignError if it cannot be read."""
     try:
         content = content_of(path, MOST_BYTES)
         return content.decode("utf-8-sig"), _hash(content)
@@ -63,12 +63,12 @@ def read(path: Path) -> tuple[str, str]:
 def content_of(path: Path, most: int | None = None) -> bytes:
     """Return the bytes of a file.
 
-    Raises DesignError for other than regular files and for more than ``most`` bytes, and OSError.
+    Raises DesignError for files that are not regular or exceed ``most`` bytes, and OSError.
     """
     about = path.stat()
     # A pipe without a writer would block whoever opens it, and with it the whole server.
     if not stat.S_ISREG(about.st_mode):
-        raise DesignError(f"{path.name} is not a regular file; choose another one")
+        raise DesignError(f"{path.name} is not a regular file; choose another file")
     if most is not None and about.st_size > most:
         raise DesignError(
             f"{path.name} holds {about.st_size:,} bytes; a design file holds at most {most:,}"
@@ -77,7 +77,7 @@ def content_of(path: Path, most: int | None = None) -> bytes:
 
 
 def state(path: Path) -> str:
-    """Hash of the file on disk; empty without a readable file."""
+    """Return the hash of the file on disk; empty without a readable file."""
     try:
         return _hash(content_of(path))
     except (OSError, DesignError):
@@ -85,7 +85,7 @@ def state(path: Path) -> str:
 
 
 def _mode(path: Path) -> int:
-    """The mode of the file at a path; 0 if there is none, or its name is too long."""
+    """Return the mode of the file at a path; 0 if there is none, or its name is too long."""
     try:
         return path.stat().st_mode
     except OSError:
@@ -93,10 +93,10 @@ def _mode(path: Path) -> int:
 
 
 def save(path: Path, text: str, expected: str | None) -> str:
-    """Writes the file whole and returns its hash.
+    """Write the file in one step and return its hash.
 
-    ``expected``: the hash that the page has read; if the file has another now, raises ChangedError.
-    Raises OutputError if it cannot be written.
+    ``expected`` is the hash that the page has read; if the file has a different one, raises
+    ChangedError. Raises OutputError if it cannot be written.
     """
     mode = _mode(path)
     if mode and not stat.S_ISREG(mode):
@@ -121,10 +121,10 @@ def save(path: Path, text: str, expected: str | None) -> str:
 
 
 def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -> tuple[str, ...]:
-    """The states of the files that a design's text names, to detect changes in them.
+    """Return the states of the files referenced by a design's text, to detect changes in them.
 
-    Raises DesignError for one outside the folder. Text that is not TOML, and values of another
-    type, are left to the reader.
+    Raises DesignError for one outside the folder. The reader handles text that is not TOML and
+    values of another type.
     """
     try:
         tables = tomllib.loads(text)
@@ -136,7 +136,7 @@ def named_files(text: str, folder: Path, above: frozenset[Path] = frozenset()) -
             continue
         path = folder / value
         if "\0" in value or not _lies_in(path, folder):
-            raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it into there")
+            raise DesignError(f"{key} = {value[:60]!r} lies outside {folder}; copy it there")
         mode = _mode(path)
         if mode and not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
             raise DesignError(f"{key} = {value[:60]!r} is not a regular file; name another one")

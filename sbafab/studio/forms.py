@@ -51,7 +51,7 @@ UNITS = (
 
 
 def families(schema: JsonSchema) -> dict[str, list[FormField]]:
-    """The fields of every family of single designs."""
+    """Return the fields of every family of single designs."""
     return {
         name: sorted(_fields(table, schema), key=_rank)
         for name, table in family_tables(schema)
@@ -60,7 +60,7 @@ def families(schema: JsonSchema) -> dict[str, list[FormField]]:
 
 
 def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
-    """The words and the drawing for choosing each family, from its record."""
+    """Return the words and the drawing for choosing each family, from its record."""
     return {
         name: {
             "title": table["title"] if "symbol" in table else name,
@@ -73,13 +73,13 @@ def cards(schema: JsonSchema) -> dict[str, dict[str, str]]:
 
 
 def summaries() -> dict[str, str]:
-    """The templates, each with the first sentence of its file."""
+    """Return the templates, each with the first sentence of its file."""
     first = {name: designs.template(name).partition("\n")[0] for name in designs.templates()}
     return {name: line.lstrip("# ") if line[:1] == "#" else "" for name, line in first.items()}
 
 
 def assembly(schema: JsonSchema) -> dict[str, Any]:
-    """The fields of an assembly, and of a part by kind, whose keys start at its table."""
+    """Return the fields of an assembly, and of a part by kind, whose keys start at its table."""
     table = _named("Assembly", schema)
     assembly_fields = sorted(_fields(table, schema), key=_rank)
     (parts,) = table["properties"]["parts"]["patternProperties"].values()
@@ -97,7 +97,7 @@ def assembly(schema: JsonSchema) -> dict[str, Any]:
 
 
 def keys(schema: JsonSchema) -> set[str]:
-    """Every dotted key of any family, and of an assembly itself."""
+    """Return every dotted key of any family, and of an assembly."""
     fields = [field for group in families(schema).values() for field in group]
     return {field["key"] for field in [*fields, *assembly(schema)["fields"]]}
 
@@ -108,7 +108,7 @@ def _rank(field: FormField) -> int:
 
 
 def _fields(table: JsonSchema, schema: JsonSchema) -> Iterator[FormField]:
-    """Yield the fields of a table; keys of tables that the user names have views of their own."""
+    """Yield the fields of a table; keys of tables named by the user have separate views."""
     for key, rule in schema_keys(table, schema):
         ways = rule.get("anyOf", [rule])
         is_own = ROW in key or NAMED in key.split(".")
@@ -160,7 +160,7 @@ def _named(reference: str, schema: JsonSchema) -> JsonSchema:
 
 
 def started(folder: Path) -> dict[str, Any]:
-    """Return the first answer to the page, without the design that it opens."""
+    """Return the first answer to the page, without its design."""
     schema = designs.schema()
     return {
         "version": __version__,
@@ -175,19 +175,19 @@ def started(folder: Path) -> dict[str, Any]:
 
 
 def table(body: bytes) -> dict[str, Any]:
-    """The table of a request. Raises SbafabError if there is none."""
+    """Return the table of a request. Raises SbafabError if there is none."""
     try:
         parsed = json.loads(body)
     except (ValueError, RecursionError):
         parsed = None
     if not isinstance(parsed, dict):
-        raise SbafabError("the request is not a table in JSON")
+        raise SbafabError("the request is not a JSON object")
     return parsed
 
 
 class PageRequest(BaseModel):
     """A request of a page for a job: its ``tab``, text and edits of the design, the name of its
-    file, keys of the shapes that it has, and the pose that it asks for.
+    file, keys of its shapes, and the requested pose.
     """
 
     tab: str = Field("", max_length=40)
@@ -208,7 +208,7 @@ def job(folder: Path, request: dict[str, Any]) -> dict[str, Any]:
         read = PageRequest.model_validate(stated)
     except ValidationError:
         raise SbafabError(
-            "a request holds a text, edits as [key, value], and a pose as a table"
+            "a request needs a text, edits as [key, value], and a pose as a table"
         ) from None
     is_file = read.name.endswith(".toml") and "/" not in read.name
     path = read.name if is_file else "design.toml"

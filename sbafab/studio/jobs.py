@@ -1,7 +1,7 @@
 """The jobs of the page: each yields its answers.
 
-A job is a table with ``do`` and the text of a design; ``pause`` raises once the answer is not
-needed. Files are only searched in ``folder``.
+A job is a table with ``do`` and the text of a design; ``pause`` raises once the answer is no longer
+needed. Files are sought only in ``folder``.
 """
 
 from __future__ import annotations
@@ -47,9 +47,9 @@ MOST_FILLINGS = 8  # number of tabs whose actuators can inflate at the same time
 
 
 def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """The edited text and design, then the displayed results, in the order in which they are known.
+    """Yield the edited text and design, then the displayed results as they become known.
 
-    Laminate and prediction come before the rules; the yield is the last of those.
+    Laminate and prediction precede the rules; the yield is the last rule.
     """
     text = _text(job)
     yield {"kind": "text", "text": text}
@@ -84,7 +84,7 @@ def live(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """An assembly's keys, its parts in place, and what the rules find in and between them."""
+    """Return an assembly's keys, its parts in place, and the findings on and between them."""
     assembly = _read(source)
     yield {"kind": "assembly", "name": assembly.name, "values": api.resolved(assembly)}
     pause()
@@ -100,7 +100,7 @@ def _assembly(source: _Source, job: StudioJob, pause: CancelCheck) -> Iterator[A
 
 
 def _prediction(design: Design, laminate: Laminate) -> Answer:
-    """Figures by closed formulas; the reason if there are none."""
+    """Return figures from closed formulas; the reason if there are none."""
     try:
         prediction = api.predict(design, quick=True, laminate=laminate)
     except SbafabError as error:
@@ -109,7 +109,7 @@ def _prediction(design: Design, laminate: Laminate) -> Answer:
 
 
 def elastic(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """All figures, including the elastic stack's, which take seconds."""
+    """Return all figures, including those of the elastic stack, which take seconds."""
     source = _source(_text(job), job)
     design = _read(source)
     pause()
@@ -135,10 +135,10 @@ def generate(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
-    """The actuator as a fast stack, and its poses as its pressures rise together.
+    """Return the actuator as a fast stack, and its poses as its pressures rise together.
 
-    The pose is at ``pressures``, absent for the data that the page needs beforehand; for an
-    assembly at the pressures of each of its ``parts``.
+    The pose is at ``pressures``, or absent for the preliminary data of the page; for an assembly,
+    at the pressures of each of its ``parts``.
     """
     source, pose = _source(_text(job), job), job.get("pose", {})
     design = _read(source)
@@ -165,7 +165,7 @@ def motion(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def _text(job: StudioJob) -> str:
-    """The edited text of the design. Raises DesignError."""
+    """Return the edited text of the design. Raises DesignError."""
     edits = job.get("edits", ())
     if len(edits) > MOST_EDITS:
         raise DesignError(f"{len(edits)} keys are changed at once; change at most {MOST_EDITS}")
@@ -173,7 +173,7 @@ def _text(job: StudioJob) -> str:
 
 
 class _Source(NamedTuple):
-    """A design's text, its path, and the states of the files that it names."""
+    """A design's text, its path, and the states of its files."""
 
     text: str
     path: Path
@@ -181,7 +181,7 @@ class _Source(NamedTuple):
 
 
 def _source(text: str, job: StudioJob) -> _Source:
-    """Raises DesignError for a file outside the folder."""
+    """Return the source. Raises DesignError for a file outside the folder."""
     folder = Path(job["folder"])
     return _Source(text, folder / job["path"], design_files.named_files(text, folder))
 
@@ -215,7 +215,7 @@ JOBS: dict[str, Callable[[StudioJob, CancelCheck], Iterator[Answer]]] = {
 
 
 class SupersededError(Exception):
-    """Nothing waits for this answer any more."""
+    """Nothing waits for this answer any longer."""
 
 
 def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
@@ -240,7 +240,7 @@ def answers(job: StudioJob, pause: CancelCheck) -> Iterator[Answer]:
 
 
 def refusal(sentence: str) -> Answer:
-    """The refusing answer, with the first key of a design file named in its sentence."""
+    """Return the refusal, with the first design key named in its sentence."""
     words = (word.strip(",;:()[]'\"") for word in sentence.split())
     named = [w for w in words if w.startswith(("parts.", "shapes.")) or w in design_keys()]
     return {"kind": "error", "message": sentence, **({"field": named[0]} if named else {})}
@@ -248,7 +248,7 @@ def refusal(sentence: str) -> Answer:
 
 @lru_cache(maxsize=1)
 def design_keys() -> frozenset[str]:
-    """Every dotted key that a design file may have."""
+    """Return every dotted key that a design file may have."""
     return frozenset(keys(api.schema()))
 
 
@@ -264,11 +264,11 @@ MOST_EDITS = 200
 
 
 def edited(text: str, edits: Iterable[Edit]) -> str:
-    """The text with every key changed. Raises DesignError if text or value is not TOML."""
+    """Return the text with every key changed. Raises DesignError if text or value is not TOML."""
     try:
         document = tomlkit.parse(text)
     except (TOMLKitError, ValueError, RecursionError) as error:
-        raise DesignError(f"the text is not valid TOML ({error}); mend it first") from None
+        raise DesignError(f"the text is not valid TOML ({error}); correct it first") from None
     for key, value in edits:
         parts = key.split(".")
         if value is None:
@@ -352,7 +352,7 @@ def _put(
 
 
 def _comment_like(old: Any, value: Any) -> None:
-    """Gives the value the old one's comment, in the same column."""
+    """Give the value the old one's comment, in the same column."""
     trivia = value.trivia
     trivia.comment, trivia.trail = old.trivia.comment, old.trivia.trail
     column = len(old.as_string()) + len(old.trivia.comment_ws)

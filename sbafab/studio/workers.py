@@ -1,7 +1,7 @@
 """Worker processes: they run the newest job of a tab and cancel the one that it replaces.
 
 A pool starts another process only if a job waits and none is idle, up to the number of processors.
-A process that dies or takes too long is replaced, and the request gets an error.
+A process that dies or takes too long is replaced, and its request gets an error.
 """
 
 from __future__ import annotations
@@ -31,12 +31,12 @@ Key = tuple[str, str]
 
 
 class BusyError(Exception):
-    """Too many jobs are waiting already."""
+    """Too many jobs are already waiting."""
 
 
 @dataclass(eq=False)
 class WaitingJob:
-    """A job with a waiting client, and its answers as they come."""
+    """A job with a waiting client, and its answers as they arrive."""
 
     pool: WorkerPool
     key: Key
@@ -44,7 +44,7 @@ class WaitingJob:
     answers: asyncio.Queue[bytes] = field(default_factory=asyncio.Queue)
 
     def end(self, kind: str, message: str = "") -> None:
-        """Adds a last answer of this kind."""
+        """Add a last answer of this kind."""
         self.answers.put_nowait(json.dumps({"kind": kind, "message": message}).encode())
         self.answers.put_nowait(END)
 
@@ -55,7 +55,7 @@ class WaitingJob:
 
 
 class WorkerPool:
-    """Processes and the jobs that wait for them. All methods belong to the event loop.
+    """Processes and their waiting jobs. All methods run in the event loop.
 
     ``seconds`` is the time limit of a job, ``processes`` the most that run at once (0: by the
     machine), and ``patience`` the seconds for a cancelled job to end.
@@ -76,7 +76,7 @@ class WorkerPool:
         self.workers.append(Worker(self))
 
     def stop(self) -> None:
-        """Ends all processes."""
+        """Stop all processes."""
         self.closed = True
         for worker in self.workers:
             worker.kill()
@@ -94,7 +94,7 @@ class WorkerPool:
         return waiting
 
     def forget(self, waiting: WaitingJob) -> None:
-        """Cancels a job without a waiting client; does nothing if it has ended."""
+        """Cancel a job without a waiting client; do nothing if it has ended."""
         if self.waiting.get(waiting.key) is waiting:
             del self.waiting[waiting.key]
         for worker in self.workers:
@@ -110,7 +110,7 @@ class WorkerPool:
                 worker.cancel()
 
     def assign(self) -> None:
-        """Give every idle process the next job it may take; start one if none is idle."""
+        """Give every idle process its next eligible job; start one if none is idle."""
         if self.closed:
             return
         for waiting in list(self.waiting.values()):
@@ -138,7 +138,7 @@ class WorkerPool:
         return any(worker.current and worker.current.key == key for worker in self.workers)
 
     def remove(self, worker: Worker, message: str) -> None:
-        """Removes a process that has ended, and informs its client; others go on."""
+        """Remove a process that has ended, and inform its client; others continue."""
         if worker not in self.workers:
             return
         self.workers.remove(worker)
@@ -190,9 +190,7 @@ class Worker:
             self.pipe.send((self.number, waiting.job))
 
     def cancel(self) -> None:
-        """Makes the current job end at its next step, or kills its process if that takes too
-        long.
-        """
+        """Make the current job end at its next step, or kill its process if that takes too long."""
         if not self.cancelled:
             self.given_up.value = self.number
             self._after(self.pool.patience, "")
@@ -202,7 +200,7 @@ class Worker:
         self.timers.append(loop.call_later(seconds, self.pool.remove, self, message))
 
     def receive(self, number: int, answer: bytes) -> None:
-        """An answer of the process arrived."""
+        """Handle an answer from the process."""
         if number == READY:
             self.ready = True
         elif self.current is not None and self.number == number:
@@ -212,19 +210,19 @@ class Worker:
         self.pool.assign()
 
     def done(self) -> None:
-        """The process is idle."""
+        """Mark the process as idle."""
         self.current = None
         while self.timers:
             self.timers.pop().cancel()
 
     def kill(self) -> None:
-        """Kills the process, whatever it is doing."""
+        """Kill the process, whatever it is doing."""
         if self.process.is_alive():
             self.process.kill()
 
 
 def _listen(pipe: Any, loop: asyncio.AbstractEventLoop, worker: Worker) -> None:
-    """Passes messages from the pipe to the event loop, in a separate thread."""
+    """Pass messages from the pipe to the event loop, in a separate thread."""
     with contextlib.suppress(RuntimeError):  # the loop has closed
         try:
             while True:
@@ -242,7 +240,7 @@ FIRST_DESIGN = "1dof-5mm"
 
 
 def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
-    """Answers (number, job) with (number, JSON) until the pipe closes."""
+    """Answer (number, job) with (number, JSON) until the pipe closes."""
     with contextlib.suppress(ValueError):
         signal.signal(signal.SIGINT, signal.SIG_IGN)
     # In the worker only: the server need not load the modules for its jobs.
@@ -271,7 +269,7 @@ def serve(pipe: Connection, cancelled: Any, warm: bool) -> None:
 
 
 def _warm_up() -> None:
-    """Import everything and check one small design, so that the first answer is quick."""
+    """Import everything and check one small design, so that the first answer is fast."""
     # As in `serve`: in the worker alone.
     from sbafab.studio.jobs import design_keys
 

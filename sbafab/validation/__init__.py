@@ -1,5 +1,5 @@
-"""Predictions against what others measured.
+"""Predictions compared with measurements of others.
 
-In: published curves with source, set-up and error. Out: a calibration fitted to them, and the
+Input: published curves with source, set-up and error. Output: a calibration fitted to them, and the
 paper's figures beside the predictions.
 """

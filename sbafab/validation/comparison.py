@@ -1,4 +1,4 @@
-"""Measured curves beside the models, point by point with 90 % intervals."""
+"""Measured curves compared with the models, point by point with 90 % intervals."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ ShortEnds = tuple[Short, Short] | None
 
 
 class ComparedPoint(Document):
-    """A measured value beside the models' range over the set-ups that its source leaves open."""
+    """A measured value and the models' range over the set-ups that its source leaves open."""
 
     x: float | None
     measured: float
@@ -50,7 +50,7 @@ class ComparedPoint(Document):
         model: Ends | None = None,
         interval: Ends | None = None,
     ) -> ComparedPoint:
-        """Return a point; without a model or an interval there is nothing to compare with."""
+        """Return a point; without a model or an interval there is no comparison."""
         return cls(
             x=x,
             measured=measured,
@@ -62,8 +62,8 @@ class ComparedPoint(Document):
         )
 
     def texts(self, unit: str) -> tuple[str, str, str, str, str]:
-        """Return the measured value with its error, the model's range, the deviation as a share of
-        the measured value, the interval, and if it holds the value, as texts.
+        """Return as text the measured value with its error, the model's range, the relative
+        deviation, the interval, and whether it contains the value.
         """
         shares = self.deviation and tuple(end / self.measured for end in self.deviation)
         return (
@@ -76,7 +76,7 @@ class ComparedPoint(Document):
 
 
 def _span(ends: tuple[float, ...] | None, form: str) -> str:
-    """Return a range as text, or one number if its ends look the same; "" for None."""
+    """Return a range as text, or one number if its ends print alike; "" for None."""
     return " to ".join(dict.fromkeys(format(end, form) for end in ends or ()))
 
 
@@ -103,8 +103,8 @@ class ComparedCurve(Document):
 
 
 def compare(evidence: Evidence, calibration: ModelCalibration | None = None) -> list[ComparedCurve]:
-    """Return the curves of a source beside the models, with a calibration beside the calibrated
-    ones and their 90 % intervals, which span the set-ups that the source leaves open.
+    """Return the curves of a source compared with the models, with a calibration also with the
+    calibrated models and their 90 % intervals, which span the set-ups that the source leaves open.
     """
     return [
         ComparedCurve.read(curve, source=evidence.id, **_beside_models(curve, calibration))
@@ -130,7 +130,7 @@ def _beside_models(curve: MeasuredCurve, calibration: ModelCalibration | None) -
 
 
 def uncertainty_for(curve: MeasuredCurve, calibration: ModelCalibration) -> Uncertainty:
-    """Return a calibration as it holds for the actuator that was measured."""
+    """Return a calibration adapted to the measured actuator."""
     tip_load = None if curve.setup.tip == "probed" else 0.0
     if not curve.is_described:
         return Uncertainty(calibration, tip_load=tip_load)
@@ -146,11 +146,11 @@ def curve_intervals(curve: MeasuredCurve, uncertainty: Uncertainty) -> list[Ends
     """Return the interval of the measured value at each point of a curve, in its unit.
 
     It is that of the mixture over the set-ups that the source leaves open, each with its
-    probability by the calibration's fit (equal ones for a curve that was not fitted), and includes
-    the calibration's uncertainty, the models' discrepancy and the error of the measurement.
+    probability from the calibration's fit (equal ones for a curve that was not fitted), and
+    includes the calibration's uncertainty, the models' discrepancy and the measurement error.
     Returns None if the calibration does not cover the quantity. A point's interval is None if a
     set-up reaches the point with the median factors, but not with factors one standard deviation
-    away; set-ups of a probability under LEAST_SHARE do not count.
+    away; set-ups with a probability under LEAST_SHARE do not count.
     """
     group = curve.discrepancy_group
     if not group:
@@ -187,9 +187,8 @@ LEAST_SHARE = 0.01
 
 
 def mixture_interval(parts: Sequence[tuple[float, float, Ends]]) -> Ends:
-    """Return the 90 % interval of a mixture of distributions, each given by its weight, its median
-    and its 90 % interval; they are normal in the logarithm if all ends are above 0, else in the
-    value.
+    """Return the 90 % interval of a mixture of distributions, each given by its weight, median and
+    90 % interval; they are normal in the logarithm if all ends are positive, else in the value.
     """
     is_log = min(low for _, _, (low, _) in parts) > 0
     into, back = (math.log, math.exp) if is_log else (float, float)
@@ -214,7 +213,7 @@ def mixture_interval(parts: Sequence[tuple[float, float, Ends]]) -> Ends:
 
 
 def widened(value: float, ends: Ends, error: float) -> Ends:
-    """Return an interval with a relative standard error added to it as an independent one."""
+    """Return an interval combined with an independent relative standard error."""
     low, high = ends
     half = deviations(SHARE) * error
     if low > 0:
@@ -237,7 +236,7 @@ class SourceDocument(Document):
 
 
 class ComparisonDocument(Document, schema="sbafab/comparison@1"):
-    """Curves of sources beside the models."""
+    """Curves of sources compared with the models."""
 
     calibration: str
     """name of the models' calibration, or none"""

@@ -1,4 +1,4 @@
-"""Measured curves as data, with set-up, error and what a source leaves out: the paper's, TOML
+"""Measured curves as data, with set-up, error and the facts that a source omits: the paper's, TOML
 files, and CSV tables of a lab's curves.
 """
 
@@ -25,9 +25,9 @@ MOST_POINTS = 10_000
 
 
 class CurveQuantity(NamedTuple):
-    """A measured quantity: its unit, its title, and the axes that it is measured against, of which
-    "" means without an axis; the ``group`` of its discrepancy if calibrations are fitted to it, and
-    why it is ``without_model``.
+    """A measured quantity: its unit, its title, and its possible axes ("" means no axis); the
+    ``group`` of its discrepancy if calibrations are fitted to it, and the reason if it is
+    ``without_model``.
     """
 
     unit: str
@@ -74,10 +74,11 @@ Sentences = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class StatedError(Section):
-    """The error of a curve's values as its source states it.
+    """The error of a curve's values as stated by its source.
 
-    ``absolute``: one per value, in the curve's unit; empty if not stated. ``relative``: of the
-    value. ``runs``: how often each value was measured; ``source``: the place that states it.
+    ``absolute``: one per value, in the curve's unit; empty if not stated. ``relative``: as a
+    fraction of the value. ``runs``: the number of measurements of each value; ``source``: the place
+    of the statement.
     """
 
     absolute: _Values = ()
@@ -95,8 +96,8 @@ class Setup(Section):
     ``supply`` feeds ``fluid`` at ``flow_ml_min`` through a tube of ``tube_mm`` length and
     ``tube_bore_mm`` bore. ``chambers`` are pressurised, the others empty. The ``tip`` is free; held
     by a plate or sensor at ``height_share`` or ``stroke_mm``; bent by ``bend_deg`` and held by a
-    sensor; or pushed to a side. A ``probed`` tip is free but for a sensor of unknown weight on it.
-    The curve's axis, which may be ``pressure_kpa``, is empty here.
+    sensor; or pushed sideways. A ``probed`` tip is free except for a sensor of unknown weight on
+    it. The curve's axis, which may be ``pressure_kpa``, is empty here.
     """
 
     supply: ShortText = ""
@@ -147,12 +148,12 @@ class MeasuredCurve(Section):
     def _agrees_with_itself(self) -> Self:
         if self.quantity not in QUANTITIES:
             near = hint(self.quantity, QUANTITIES)
-            raise ValueError(f"has the quantity {shown(self.quantity)}, which is not known; {near}")
+            raise ValueError(f"has the unknown quantity {shown(self.quantity)}; {near}")
         axes, values = QUANTITIES[self.quantity].axes, len(self.y)
         if self.x_name not in axes:
             raise ValueError(
                 f"has x_name = {shown(self.x_name)}, which is not an axis of {self.quantity}; "
-                f"write one of {listed(axes)}"
+                f"use one of {listed(axes)}"
             )
         if len(self.x) != (values if self.x_name else 0):
             fix = "give one for each" if self.x_name else "remove them, or name their axis: x_name"
@@ -175,7 +176,7 @@ class MeasuredCurve(Section):
 
     @property
     def test(self) -> str:
-        """The test that the curve comes from."""
+        """The test of the curve."""
         return self.group or self.id
 
     @property
@@ -195,7 +196,7 @@ class MeasuredCurve(Section):
 
     @property
     def errors(self) -> tuple[float | None, ...]:
-        """Standard errors of the values, in their unit; None if the source does not state them."""
+        """The standard errors of the values, in their unit; None if the source states none."""
         stated = self.error
         if not stated.absolute and not stated.relative:
             return (None,) * len(self.y)
@@ -225,14 +226,14 @@ class MeasuredCurve(Section):
         return None if stated is None else (stated,) * len(self.y)
 
     def points(self) -> Iterator[tuple[float | None, float, float | None]]:
-        """Yield the values: the place on the axis (None without one), value, and standard error."""
+        """Yield the values: position on the axis (None without one), value, standard error."""
         return zip(self.x or (None,) * len(self.y), self.y, self.errors, strict=True)
 
 
 class Evidence(Section):
     """The measured curves of one source: a paper, or a lab's file or records.
 
-    ``missing``: sentences on figures of the source that could not be had.
+    ``missing``: sentences about figures of the source that were unavailable.
     """
 
     schema_name: Literal["sbafab/evidence@1"] = Field(default="sbafab/evidence@1", alias="schema")
@@ -247,26 +248,26 @@ class Evidence(Section):
         names = [curve.id for curve in self.curves]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(f"has two curves {shown(name)}; give each its id")
+                raise ValueError(f"has two curves {shown(name)}; give each a unique id")
         return self
 
     def curve(self, name: str) -> MeasuredCurve:
-        """Return the curve of an id. Raises KeyError without one."""
+        """Return the curve with an id. Raises KeyError if there is none."""
         return {curve.id: curve for curve in self.curves}[name]
 
 
 def load_evidence(source: str | Path) -> Evidence:
     """Return the paper's evidence, or that of a file (``.toml``, ``.csv``).
 
-    Raises DesignError with one sentence if the source does not exist or has a fault.
+    Raises DesignError with one sentence if the source does not exist or is invalid.
     """
     if str(source) == PAPER:
         return _papers()
     path = Path(source)
     if path.suffix.lower() not in (".toml", ".csv"):
         raise DesignError(
-            f"{shown(source)} is neither evidence that ships nor a file that ends in .toml or "
-            f".csv; {hint(str(source), (PAPER,))}"
+            f"{shown(source)} is neither bundled evidence nor a .toml or .csv file; "
+            f"{hint(str(source), (PAPER,))}"
         )
     return read_csv(path) if path.suffix.lower() == ".csv" else read_evidence(path)
 
@@ -279,13 +280,13 @@ def _papers() -> Evidence:
 def read_evidence(path: Path) -> Evidence:
     """Return the evidence of a TOML file; its id is the file's name.
 
-    A ``design`` that is a file is taken to lie beside it. Raises DesignError with one sentence.
+    A ``design`` that is a file is relative to it. Raises DesignError with one sentence.
     """
     return _evidence(path, {"schema": "", **read_toml(path)})
 
 
 def _evidence(path: Path, tables: Mapping[str, Any]) -> Evidence:
-    """Return the evidence of tables; design files lie beside the evidence."""
+    """Return the evidence of tables; design files are relative to the evidence."""
     curves = tables.get("curves")
     for curve in curves if isinstance(curves, list) else ():
         if isinstance(curve, dict) and str(curve.get("design")).endswith(".toml"):
@@ -320,9 +321,9 @@ def read_csv(path: Path) -> Evidence:
     """Return the curves of a table with some of COLUMNS; the file's name is their id and citation.
 
     Columns are separated by commas, semicolons or tabs, the latter two also with decimal commas.
-    Rows of one ``curve`` need not be adjacent; without that column the quantity separates curves. A
-    cell that applies to the whole curve may be in any of its rows. Raises DesignError with the
-    line.
+    Rows of one ``curve`` need not be adjacent; without that column the quantity distinguishes
+    curves. A cell that applies to the whole curve may be in any of its rows. Raises DesignError
+    with the line.
     """
     curves: dict[str, dict[str, list[Any]]] = defaultdict(lambda: defaultdict(list))
     for where, cells in table_rows(path, ("quantity", "y")):
@@ -333,17 +334,17 @@ def read_csv(path: Path) -> Evidence:
             raise DesignError(f"{where} has no y; fill it in or remove the line")
         name = row.get("curve") or row.get("quantity", "")
         if not name:
-            raise DesignError(f"{where} names no curve and no quantity; fill in one of the two")
+            raise DesignError(f"{where} has neither curve nor quantity; fill in one of them")
         for key, cell in row.items():
             value, values = _cell_value(cell, key, where), curves[name][key]
             if key not in OF_A_VALUE and values and values[0] != value:
                 raise DesignError(
-                    f"{where}: {key} is {shown(cell)}, and {shown(values[0])} in an earlier line "
-                    "of this curve; write one of the two, or name two curves"
+                    f"{where}: {key} is {shown(cell)}, but {shown(values[0])} in an earlier line "
+                    "of this curve; use one of them, or name two curves"
                 )
             values.append(value)
     if not curves:
-        raise DesignError(f"{path} has no row below its columns; fill in one for each value")
+        raise DesignError(f"{path} has no rows below its header; fill in one for each value")
     tables = [_table(name, columns, path.name) for name, columns in curves.items()]
     return _evidence(path, {"citation": f"measurements in {path.name}", "curves": tables})
 
@@ -367,12 +368,12 @@ def _table(name: str, columns: Mapping[str, list[Any]], file: str) -> dict[str, 
 
 
 def _unmarked(cell: str) -> str:
-    """Return a cell without the mark that keeps a spreadsheet from taking it for a formula."""
+    """Return a cell without the mark that keeps a spreadsheet from reading it as a formula."""
     return cell[1:] if cell[:1] == "'" and plain_text(cell[1:]) == cell else cell
 
 
 def _cell_value(cell: str, key: str, where: str) -> Any:
-    """Return the value of a cell. Raises DesignError for one that its column does not take."""
+    """Return the value of a cell. Raises DesignError for one that is invalid in its column."""
     if key in NUMBERS:
         number = float(cell.replace(",", ".")) if _NUMBER.fullmatch(cell) else math.nan
         if math.isfinite(number):

@@ -78,7 +78,7 @@ class CalibrationFit(NamedTuple):
 def usable_curves(
     sources: Sequence[Evidence],
 ) -> tuple[list[MeasuredCurve], list[tuple[str, str]]]:
-    """Return the curves that a calibration can be fitted to, and the others with their reasons."""
+    """Return the curves usable for a calibration, and the others with their reasons."""
     curves, left_out = [], []
     for source in sources:
         for curve in source.curves:
@@ -103,19 +103,19 @@ MIDDLES: dict[str, Any] = {unknown.field: unknown.middle for unknown in UNKNOWNS
 
 
 def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> CalibrationFit:
-    """Return the calibration of sources of evidence.
+    """Return the calibration to sources of evidence.
 
-    Raises DesignError if no curve of theirs can be fitted, or without emcee.
+    Raises DesignError if none of their curves can be fitted, or without emcee.
     """
     installed_emcee()
     usable, left_out = usable_curves(sources)
     if not usable:
         reasons = "; ".join(f"{curve}: {reason}" for curve, reason in left_out)
-        raise DesignError(f"no curve can be fitted to ({reasons})")
+        raise DesignError(f"no curve can be fitted ({reasons})")
     films = sorted({film_of(curve) for curve in usable})
     if len(films) > 1:
         raise DesignError(
-            f"the curves are of {len(films)} films ({', '.join(films)}); calibrate each by itself"
+            f"the curves are of {len(films)} films ({', '.join(films)}); calibrate each separately"
         )
     curves = sampled_curves(usable, progress)
     progress("posterior", 0, 1)
@@ -136,7 +136,7 @@ def fit(name: str, sources: Sequence[Evidence], progress: Progress) -> Calibrati
 def open_set_ups(
     measured: Sequence[MeasuredCurve], curves: Sequence[SampledCurve], posterior: Posterior
 ) -> dict[str, dict[str, float]]:
-    """Return the set-ups of each curve whose source leaves some open, with their probabilities."""
+    """The candidate set-ups of each curve with an ambiguous source, with their probabilities."""
     shares = {}
     for source, curve in zip(measured, curves, strict=True):
         series = model_values(source, Factors(**MIDDLES)).series
@@ -147,13 +147,13 @@ def open_set_ups(
 
 
 def film_of(curve: MeasuredCurve) -> str:
-    """Return the products of the films of the actuator that was measured."""
+    """Return the products of the films of the measured actuator."""
     return " and ".join(bonding_products(ModelledActuator(curve, Factors(**MIDDLES)).laminate))
 
 
 def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[SampledCurve]:
     """Return curves in the form for the posterior: the models' values at all nodes of the unknowns
-    that change them.
+    that affect them.
     """
     sampled_ones = []
     for done, curve in enumerate(curves):
@@ -186,8 +186,8 @@ def sampled_curves(curves: Sequence[MeasuredCurve], progress: Progress) -> list[
 
 
 def factors_at(coordinates: Mapping[int, float]) -> Factors:
-    """Return the factors with some unknowns at coordinates, by their column, the others in the
-    middle of their priors; no delay and no loss, which are terms of a figure.
+    """Return the factors with some unknowns at coordinates, by their column, the others at the
+    middle of their priors; without delay and loss, which are terms of a figure.
     """
     values: dict[str, Any] = {
         unknown.field: unknown.value(coordinates[at]) if at in coordinates else unknown.middle
@@ -197,7 +197,7 @@ def factors_at(coordinates: Mapping[int, float]) -> Factors:
 
 
 def axes_of(curve: MeasuredCurve) -> tuple[int, ...]:
-    """Return the columns of the unknowns that change the models' values of a curve."""
+    """Return the columns of the unknowns that affect the models' values of a curve."""
     axes = []
     for axis, nodes in enumerate(NODE_COORDINATES):
         ends = [logarithms(curve, factors_at({axis: float(nodes[end])})) for end in (0, -1)]
@@ -210,7 +210,7 @@ def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
     """Return logarithms of the models' values of a curve (open set-ups, points).
 
     A state that an actuator does not reach has IMPOSSIBLE times the measured value. Raises
-    DesignError if no model gives the curve.
+    DesignError if no model predicts the curve.
     """
     try:
         series = model_values(curve, factors, shares_maps=True).series
@@ -221,8 +221,8 @@ def logarithms(curve: MeasuredCurve, factors: Factors) -> Array:
 
 
 def term_of(curve: MeasuredCurve) -> str:
-    """Return the field of the unknown that a curve's values have as a term: the delay of times, or
-    the share itself that a cycle loses; "" without one.
+    """Return the field of the unknown that is a term of a curve's values: the delay of times, or
+    the share of work lost in a cycle; "" if there is none.
     """
     if curve.quantity == "time_s":
         return "water_delay" if curve.setup.fluid == "water" else "air_delay"
@@ -241,9 +241,9 @@ def left_out_fits(
     progress: Progress,
     only: Collection[str] = (),
 ) -> Iterator[tuple[str, int, Posterior]]:
-    """Yield fits that each leave out the curves of one key, such as their test or their actuator,
-    every key in turn or each of ``only``: the key, the seed of its random numbers, and the
-    posterior. Yields nothing if all curves have one key.
+    """Yield fits that each leave out the curves of one key, such as their test or actuator. Every
+    key in turn or each of ``only``: the key, the seed of its random numbers, and the posterior.
+    Yields nothing if all curves have one key.
     """
     names = list(dict.fromkeys(keys))
     for done, name in enumerate(names if len(names) > 1 else ()):
@@ -278,7 +278,7 @@ def predicted_points(
 
 
 def sizes_of_groups(curves: Sequence[MeasuredCurve]) -> dict[str, SizeRange]:
-    """Return the sizes of the actuators that were measured, by group of quantities."""
+    """Return the sizes of the measured actuators, by group of quantities."""
     by_group: dict[str, SizeRange] = {}
     for curve in curves:
         of = ModelledActuator(curve, Factors(**MIDDLES))
@@ -296,7 +296,7 @@ def as_calibration(
     sizes: Mapping[str, SizeRange],
     set_ups: Mapping[str, Mapping[str, float]],
 ) -> ModelCalibration:
-    """Return the calibration that a posterior stands for."""
+    """Return a posterior as a calibration."""
     table = {
         "schema": "sbafab/calibration@3",
         "name": name,
@@ -322,7 +322,7 @@ def as_calibration(
 
 
 def correlated(covariance: Array) -> Iterator[str]:
-    """Yield the pairs of unknowns that are correlated by TOLD_APART or more either way."""
+    """Yield the pairs of unknowns with a correlation of magnitude TOLD_APART or more."""
     deviations = np.sqrt(np.diag(covariance))
     table = covariance / np.outer(deviations, deviations)
     for (i, first), (j, second) in combinations(enumerate(UNKNOWNS), 2):
@@ -331,7 +331,7 @@ def correlated(covariance: Array) -> Iterator[str]:
 
 
 def calibration_text(calibration: ModelCalibration) -> str:
-    """Return the text of a calibration's file; comments at the top describe its unknowns."""
+    """Return the text of a calibration file; comments at the top describe its unknowns."""
     lines = ["# Written by sbafab calibrate. Medians, with 90 % intervals in parentheses:"]
     for unknown in UNKNOWNS:
         low, high = calibration.bounds(unknown.field)

@@ -1,4 +1,4 @@
-"""Values of the models at the points of a measured curve, or why there are none."""
+"""Values of the models at the points of a measured curve, or the reason if there are none."""
 
 from __future__ import annotations
 
@@ -74,8 +74,8 @@ def model_values(
 ) -> ModelValues:
     """Return the values of the models at a curve's points.
 
-    ``factors`` come from a calibration; by default the models use none. For an open set-up, every
-    assumption that matters gives one series. ``shares_maps`` is for fits with many factors. Raises
+    ``factors`` come from a calibration; by default there are none. For an open set-up, every
+    relevant assumption gives one series. ``shares_maps`` is for fits with many factors. Raises
     DesignError with the reason if no model has values.
     """
     answer = ANSWERS.get(curve.quantity)
@@ -88,7 +88,7 @@ def model_values(
 
 @lru_cache(maxsize=64)
 def _measured_design(text: str) -> tuple[Design, Laminate]:
-    """Return design and laminate of a measured actuator by its text. Raises DesignError."""
+    """Return design and laminate of a measured actuator from its text. Raises DesignError."""
     name, changes, toml = json.loads(text)
     if toml:
         tables = toml_tables(toml, "the record's design")
@@ -158,7 +158,7 @@ class ModelledActuator:
         return elastic.calibrated(model, self.factors).name
 
     def balloons(self, modulus_ratio: float | None = None) -> list[Balloon]:
-        """Return the balloons of one chamber, of their or another modulus ratio. Raises
+        """Return the balloons of one chamber, at their own or another modulus ratio. Raises
         DesignError.
         """
         ratio = self.factors.modulus_ratio if modulus_ratio is None else modulus_ratio
@@ -170,8 +170,8 @@ class ModelledActuator:
         return self.stack.pose(pressures, self.tip_load)
 
     def filling(self, chambers: int) -> BatchPoses:
-        """Return the free poses with some chambers at rising pressures, up to the first that has
-        none.
+        """Return the free poses with some chambers at rising pressures, up to the first without
+        one.
         """
         most = min(self.stack.most_pressure, MOST_FREE_KPA * self.factors.modulus_ratio)
         rows = np.zeros((SAMPLES, self.stack.chambers))
@@ -181,13 +181,14 @@ class ModelledActuator:
 
     @property
     def tip_load(self) -> tuple[float, float, float]:
-        """Force in N on the tip by what stands on it, for a base that lies level."""
+        """The force in N on the tip due to its load, for a level base."""
         is_probed = self.curve.setup.tip == "probed"
         return elastic.tip_force(self.factors) if is_probed else (0.0, 0.0, 0.0)
 
     @property
     def chambers_that_bend(self) -> dict[str, int]:
-        """How many chambers may have been pressurised for a bend, by the phrase that assumes it.
+        """Return the possible numbers of pressurised chambers for a bend, by the phrase that
+        assumes it.
 
         Raises DesignError for one chamber.
         """
@@ -229,7 +230,7 @@ def _forces(of: ModelledActuator) -> NamedSeries:
     curve = of.curve
     angles, pressures = curve.at("bend_deg"), curve.at("pressure_kpa")
     if pressures is None:
-        raise DesignError("the set-up names no pressure")
+        raise DesignError("the set-up states no pressure")
     if angles is not None:
         return of.model(), _bent_forces(of, list(zip(angles, pressures, strict=True)))
     pushing = curve.setup.chambers or of.actuator.form.pushing
@@ -255,7 +256,7 @@ def _blocked_states(of: ModelledActuator) -> Series:
     if strokes is not None and of.curve.x_name != "height_share":
         return {"": strokes}
     if shares is None:
-        raise DesignError("the set-up names no height at which the tip is held")
+        raise DesignError("the set-up does not state the height at which the tip is held")
     if not any(shares):
         return {"": shares}
 
@@ -286,7 +287,7 @@ def _bent_forces(of: ModelledActuator, pairs: Sequence[tuple[float, float]]) -> 
     def force(bent: int, filled: int, angle: float, pressure: float) -> float:
         pose = poses[bent, angle]
         if pose is None or pose.pressures[0] > pressure:
-            raise DesignError("it does not bend so far")
+            raise DesignError("it does not bend that far")
         return elastic.pressed_further(of.stack, filled, pressure, pose).force
 
     series: Series = {}
@@ -351,7 +352,7 @@ def _by_volume(
     volumes: Sequence[float],
     values: Callable[[BatchPoses], Array],
 ) -> tuple[ModelValue, ...]:
-    """Return values of the free stack with volumes in ul added to some chambers in total, by
+    """Return values of the free stack with volumes in ul added to some chambers in total, from
     poses at rising pressures. None for a volume that MOST_FREE_KPA does not reach.
     """
     poses = of.filling(chambers)
@@ -365,7 +366,7 @@ def _by_volume(
 def _balloon_strokes(of: ModelledActuator) -> NamedSeries:
     balloons = of.balloons()
     if len(set(balloons)) > 1:
-        raise DesignError("its balloons are of unlike size")
+        raise DesignError("its balloons differ in size")
     if of.curve.x_name == "volume_ul":
         # Of the whole stack, since what stands on it is carried by every balloon.
         count = len(balloons)
@@ -391,7 +392,7 @@ def _energies(of: ModelledActuator) -> NamedSeries:
 
 @lru_cache(maxsize=1024)
 def _stored(balloon: Balloon, pressure: float) -> float:
-    """Return the energy in uJ that the films of a free balloon hold. Raises DesignError."""
+    """Return the energy in uJ stored in the films of a free balloon. Raises DesignError."""
     shape = free_shapes(balloon, pressure)
     if float(stretch(balloon, shape)[0]) > MOST_STRETCH:
         raise DesignError(f"at {pressure:g} kPa its films would stretch too far")
@@ -399,7 +400,7 @@ def _stored(balloon: Balloon, pressure: float) -> float:
 
 
 def _losses(of: ModelledActuator) -> NamedSeries:
-    """Return work lost, as the calibration's share of the input work."""
+    """Return the work lost, from the calibration's share of the input work."""
     model, series = _energies(of)
     return model, {"": tuple(of.factors.loss_share * (each or 0.0) for each in series[""])}
 
@@ -412,7 +413,7 @@ def _loss_shares(of: ModelledActuator) -> NamedSeries:
 def _times(of: ModelledActuator) -> NamedSeries:
     setup, until = of.curve.setup, of.curve.x
     if setup.flow_ml_min is None:
-        raise DesignError("the set-up names no flow")
+        raise DesignError("the set-up states no flow")
     flow, bore = setup.flow_ml_min, setup.tube_bore_mm or TUBE_DIAMETER
     is_bend = of.curve.x_name == "bend_deg"
     is_water = setup.fluid == "water" or (is_bend and setup.fluid != "air")
@@ -426,7 +427,7 @@ def _times(of: ModelledActuator) -> NamedSeries:
     if setup.tube_mm is not None:
         tubes = {"": max(setup.tube_mm, NO_TUBE)}
     if is_water and bore != TUBE_DIAMETER:
-        raise DesignError(f"times of water are of a tube of {TUBE_DIAMETER:g} mm bore")
+        raise DesignError(f"times for water need a tube of {TUBE_DIAMETER:g} mm bore")
 
     def time(kpa: float, length: float) -> float:
         if is_water:
@@ -441,7 +442,7 @@ def _times(of: ModelledActuator) -> NamedSeries:
 def _time_to_bend(
     of: ModelledActuator, chambers: int, angle: float, flow: float, delay: float
 ) -> ModelValue:
-    """Return the seconds until the tip is bent, all the flow in some chambers, no tube."""
+    """Return the seconds until the tip is bent, if all the flow fills some chambers, no tube."""
     pose = elastic.pose_bent_by(of.stack, chambers, angle)
     if pose is None:
         return None

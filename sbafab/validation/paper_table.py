@@ -1,8 +1,5 @@
-"""The paper's figures beside the predictions: each row of ``paper_table.csv`` with the model's
-value, the values that the calibration covers, and both as a page with charts.
-
-A row's ``source`` is a template and the key of a figure of its prediction without a calibration, or
-the name of one of ``_computed``.
+"""The paper's figures compared with the predictions: each row of ``paper_table.csv`` with the
+model's value, the values that the calibration covers, and both as a page with charts.
 """
 
 from __future__ import annotations
@@ -61,7 +58,7 @@ CHARTS = {
 
 
 class Row(Document):
-    """A figure of the paper beside the prediction."""
+    """A figure of the paper with its prediction."""
 
     section: str
     figure: str
@@ -112,7 +109,7 @@ def predicted(
 
 @dataclass(frozen=True)
 class PaperTable:
-    """The paper's figures beside the models, computed when first asked for."""
+    """The paper's figures beside the models, computed on demand."""
 
     @cached_property
     def predictions(self) -> Mapping[str, Prediction]:
@@ -154,15 +151,15 @@ class PaperTable:
 
     @cached_property
     def calibration(self) -> ModelCalibration:
-        """The shipped calibration."""
+        """The bundled calibration."""
         calibration = load_calibration(PAPER)
         assert calibration is not None, "it ships"
         return calibration
 
     @cached_property
     def curves(self) -> tuple[ComparedCurve, ...]:
-        """The paper's comparable curves that the calibration covers, beside the models calibrated
-        on them.
+        """The paper's comparable curves that the calibration covers, compared with the models
+        calibrated on them.
         """
         return tuple(
             compared
@@ -172,7 +169,7 @@ class PaperTable:
 
     @property
     def summary(self) -> str:
-        """The number of values that lie in their intervals."""
+        """The number of values inside their intervals."""
         within = [p.within for curve in self.curves for p in curve.points if p.interval]
         return f"{sum(map(bool, within))} of {len(within)} in the 90 % intervals of the calibration"
 
@@ -234,7 +231,7 @@ def _calibrated_rows(curves: Sequence[ComparedCurve]) -> Iterator[tuple[str, ...
 
 
 def _computed(predictions: Mapping[str, Prediction]) -> dict[str, float]:
-    """Return the values of rows and reasons that are no figure of a prediction, by name."""
+    """Return the values of rows, and reasons, that are not figures of a prediction, by name."""
     three, ten = predictions["3dof-15mm"], predictions["1dof-10mm"]
     design = load_design("3dof-15mm")
     plan = schedule(build(design), design.completed())
@@ -300,7 +297,7 @@ def _of_stack(whole: Stack) -> Iterator[tuple[str, float]]:
 
 
 def press_factor() -> float:
-    """Return pressed over nominal film thickness of the 3-DoF, if its masks kept theirs."""
+    """Return pressed over nominal film thickness of the 3-DoF, assuming that masks keep theirs."""
     folded = Factors().folded(build(load_design("3dof-15mm")))
     return (paper.FLAT_HEIGHT.value - folded.solid) / folded.molten
 
@@ -327,5 +324,5 @@ class ReproductionDocument(Document, schema="sbafab/reproduction@1"):
 
 
 def as_json(table: PaperTable, **more: str) -> dict[str, Any]:
-    """Return the contents of ``reproduction.json``, and ``more``."""
+    """Return the contents of ``reproduction.json``, with ``more``."""
     return ReproductionDocument.of(None, rows=table.rows, calibrated=table, **more)

@@ -5,8 +5,8 @@ the error of the measurement. Discrepancies are normal with one standard deviati
 quantities; half of their variance is shared by the points of a curve. If a source leaves the set-up
 open, all candidate set-ups are equally likely.
 
-Pockets differ from pressing to pressing: the pocket loss of an actuator is normal about the mean of
-a lab's pressing, with a spread of its own.
+Pockets differ between pressings: the pocket loss of an actuator is normal about the lab's mean,
+with its own spread.
 
 Logarithms of the models' values are interpolated linearly in the coordinates of the unknowns.
 """
@@ -53,8 +53,8 @@ NODE_COORDINATES = [np.linspace(*ends) for ends in zip(LEAST, MOST, NODES, stric
 
 
 def interpolated(table: Array, axes: Sequence[int], coordinates: Array) -> Array:
-    """Return values linear between the nodes of a table (nodes of each of ``axes``, ...), columns
-    of UNKNOWNS, at coordinates (n, unknowns): (n, ...).
+    """Return values interpolated linearly between the nodes of a table (nodes of each of ``axes``,
+    ...), columns of UNKNOWNS, at coordinates (n, unknowns): (n, ...).
     """
     row = np.zeros((1, len(coordinates)), dtype=np.int_)
     weight = np.ones((1, len(coordinates)))
@@ -72,11 +72,11 @@ def interpolated(table: Array, axes: Sequence[int], coordinates: Array) -> Array
 
 
 class SampledCurve(NamedTuple):
-    """A curve for the posterior: the ``test`` that it comes from, the name of the ``actuators`` of
-    its points, the number of its quantity's ``group`` in GROUPS, a ``table`` of logarithms of the
-    models' values (nodes of each of ``axes``, open set-ups, points) by the columns ``axes`` of
-    UNKNOWNS, logarithms of the ``measured`` values and their standard ``errors``, (points,), and
-    the column in UNKNOWNS of the unknown that its values have as a ``term`` (-1: none).
+    """A curve for the posterior. It has its ``test``, the ``actuators`` of its points, the number
+    of its quantity's ``group`` in GROUPS, a ``table`` of logarithms of the models' values (nodes of
+    each of ``axes``, open set-ups, points) by the columns ``axes`` of UNKNOWNS, logarithms of the
+    ``measured`` values and their standard ``errors``, (points,), and the column in UNKNOWNS of the
+    unknown that is a ``term`` of its values (-1: none).
     """
 
     test: str
@@ -89,9 +89,9 @@ class SampledCurve(NamedTuple):
     term: int = -1
 
     def logarithms(self, unknowns: Array, losses: Mapping[str, Array]) -> Array:
-        """Return logarithms of the models' values (n, open set-ups, points) at ``unknowns``
-        (n, unknowns) with the pocket losses (n,) of the actuators, with the term in them, such as
-        the delay of pump or valve.
+        """Return logarithms of the models' values (n, open set-ups, points) at ``unknowns`` (n,
+        unknowns) with the pocket losses (n,) of the actuators. The curve's term, such as the delay
+        of a pump or valve, is included.
         """
         values = np.empty((len(unknowns), *self.table.shape[len(self.axes) :]))
         for actuator in dict.fromkeys(self.actuators):
@@ -108,8 +108,8 @@ class SampledCurve(NamedTuple):
         the models' values (n, set-ups, points), with standard deviations of the discrepancies
         (logarithms, n).
 
-        A normal whose covariance is the discrepancy's plus the measurement's: a diagonal and one
-        shared part, whose inverse and determinant have closed forms (Sherman and Morrison).
+        It is normal with the covariance of discrepancy plus measurement: a diagonal and one shared
+        part, whose inverse and determinant have closed forms (Sherman and Morrison).
         """
         residuals = self.measured - values
         squares = np.exp(2 * log_scales)[:, None]
@@ -124,10 +124,10 @@ class SampledCurve(NamedTuple):
 
 @dataclass(frozen=True)
 class Posterior:
-    """Samples: ``unknowns`` (n, unknowns), coordinates whose pocket loss is the mean of the lab's
-    pressing; the ``spread`` (n,) of losses in mm; the ``losses`` (n,) of the actuators that were
-    fitted; ``scales`` (n, groups), logarithms of the discrepancies' standard deviations; and for an
-    actuator of which nothing is known the ``departure`` (n,) of its loss in spreads.
+    """Samples of the posterior. ``unknowns`` (n, unknowns) are coordinates whose pocket loss is the
+    lab's mean; ``spread`` (n,) of losses is in mm; ``losses`` (n,) are those of the fitted
+    actuators; ``scales`` (n, groups) are logarithms of the discrepancies' standard deviations;
+    ``departure`` (n,) is the deviation of an unmeasured actuator's loss, in spreads.
     """
 
     unknowns: Array
@@ -148,25 +148,25 @@ class Posterior:
 
     @cached_property
     def new_loss(self) -> Array:
-        """Pocket losses (n,) of an actuator of which nothing is known, mm."""
+        """Pocket losses (n,) of an unmeasured actuator, mm."""
         drawn = self.unknowns[:, LOSS] + self.spread * self.departure
         return np.asarray(np.clip(drawn, LEAST[LOSS], MOST[LOSS]))
 
     @cached_property
     def coordinates(self) -> Array:
-        """Coordinates (n, unknowns) of an actuator of which nothing is known."""
+        """Coordinates (n, unknowns) of an unmeasured actuator."""
         places = self.unknowns.copy()
         places[:, LOSS] = self.new_loss
         return places
 
     @cached_property
     def mean(self) -> Array:
-        """Mean coordinates (unknowns,) of an actuator of which nothing is known."""
+        """Mean coordinates (unknowns,) of an unmeasured actuator."""
         return np.asarray(self.coordinates.mean(0))
 
     @cached_property
     def covariance(self) -> Array:
-        """Covariance of the coordinates (unknowns, unknowns) of such an actuator."""
+        """Covariance of the coordinates (unknowns, unknowns) of an unmeasured actuator."""
         return np.asarray(np.cov(self.coordinates.T))
 
     @cached_property
@@ -177,13 +177,13 @@ class Posterior:
 
     def logarithms(self, curve: SampledCurve) -> Array:
         """Return logarithms of the models' values of a curve (n, set-ups, points); its actuators
-        are new ones, with one drawn loss, if the fit has not seen them.
+        are new, with one sampled loss, if they are not in the fit.
         """
         new = dict.fromkeys(curve.actuators, self.new_loss)
         return curve.logarithms(self.unknowns, {**new, **self.losses})
 
     def predicted(self, curve: SampledCurve, generator: np.random.Generator) -> Array:
-        """Return drawn logarithms of measured values of a curve (n, points)."""
+        """Return sampled logarithms of the measured values of a curve (n, points)."""
         values = self.logarithms(curve)
         count, setups, points = values.shape
         chosen = values[np.arange(count), generator.integers(setups, size=count)]
@@ -191,8 +191,8 @@ class Posterior:
         return np.asarray(chosen + missed + curve.errors * generator.standard_normal(missed.shape))
 
     def log_score(self, curve: SampledCurve) -> float:
-        """Return the logarithm of the density that a curve's measured values have by the fit: their
-        log score, in units of the logarithms of the values.
+        """Return the log score of a curve's measured values: the logarithm of their density under
+        the fit, in units of the logarithms of the values.
         """
         logs = curve.densities(self.logarithms(curve), self.scales[:, curve.group])
         most = float(logs.max())
@@ -200,7 +200,7 @@ class Posterior:
 
 
 def set_up_probabilities(curve: SampledCurve, posterior: Posterior) -> Array:
-    """Return the probability of each set-up that a curve's source leaves open, by the fit to it:
+    """Return the probability of each set-up that a curve's source leaves open, from the fit:
     (set-ups,).
     """
     logs = curve.densities(posterior.logarithms(curve), posterior.scales[:, curve.group])
@@ -209,7 +209,7 @@ def set_up_probabilities(curve: SampledCurve, posterior: Posterior) -> Array:
 
 
 def discrepancies(scales: Array, points: int, generator: np.random.Generator) -> Array:
-    """Return drawn discrepancies of curves with ``scales`` (n,): (n, points)."""
+    """Return sampled discrepancies of curves with ``scales`` (n,): (n, points)."""
     count = len(scales)
     common = generator.standard_normal((count, 1)) * math.sqrt(SHARED)
     each = generator.standard_normal((count, points)) * math.sqrt(1 - SHARED)
@@ -277,7 +277,7 @@ def sampled(curves: Sequence[SampledCurve], seed: int = SEED, steps: int = STEPS
 
 
 def _start(generator: np.random.RandomState, actuators: int) -> Array:
-    """Return places within the prior to start from (walkers, coordinates of a chain)."""
+    """Return initial positions within the prior (walkers, coordinates of a chain)."""
     drawn = MIDDLES[:, None] + 0.5 * SPREADS[:, None] * generator.randn(len(UNKNOWNS), WALKERS)
     margin = 1e-3 * (MOST - LEAST)
     margin[LOSS] = PRESSING_MIDDLE

@@ -203,7 +203,9 @@ def test_a_width_unlike_the_drawn_strip_is_named() -> None:
     assert [finding.verdict for finding in findings[2.0]] == ["pass"]
     *_, unlike = findings[3.0]
     assert unlike.verdict == "warn"
-    assert "stated 3.000 mm wide and drawn 2.000, x 0.000, y 24.000" in unlike.message
+    assert (
+        "stated width of 3.000 mm but is drawn 2.000 mm wide, x 0.000, y 24.000" in unlike.message
+    )
 
 
 # Layers in any order, and films bonded by seams.
@@ -307,14 +309,14 @@ def too_narrow(data: dict[str, Any]) -> None:
 
 
 FAULTS: list[tuple[Callable[[dict[str, Any]], None], str, Point]] = [
-    (without_hole, "net a is open: left is not joined to supply; they come nearest at", (-8, -5.5)),
+    (without_hole, "net a is open: left is not joined to supply; they are nearest at", (-8, -5.5)),
     (with_bridge, "nets a and b are joined at interface 2", (0, 0)),
     (with_stub, "net a has a dead end at interface 1", (-12, -2)),
     (with_second_hole, "net b reaches the outside at layer 5", (8, -3)),
-    (without_route, "net a is open: left is not joined to supply; they come nearest", (-8, -7.1)),
+    (without_route, "net a is open: left is not joined to supply; they are nearest", (-8, -7.1)),
     (
         too_narrow,
-        "of net a that is hardest to open is drawn 0.250 mm wide, at interface 1",
+        "of net a that is hardest to open is 0.250 mm wide as drawn, at interface 1",
         (-8, -7.5),
     ),
 ]
@@ -347,7 +349,7 @@ def test_a_chamber_lies_in_its_net_in_each_of_its_balloons(tmp_path: Path) -> No
     data["layers"][3]["shape"] = "to-right"
     messages = [f.message for f in failures(drawn(tmp_path, data)) if f.rule == "nets"]
     assert [message.split(" (")[0] for message in messages] == [
-        "net a is open: the pocket of a in balloon 2 lies in no void"
+        "net a is open: the pocket of a in balloon 2 lies outside all voids"
     ]
 
 

@@ -123,7 +123,7 @@ def test_what_is_solved_is_solved_again_and_what_is_given_is_held_to(tmp_path: P
     given = design.with_("chamber.diameter=6")
     assert given.chamber.diameter == 6
     assert given.with_("bond.width=1").chamber.diameter == 6
-    with pytest.raises(DesignError, match=r"fits.outline at least 21\.000"):
+    with pytest.raises(DesignError, match=r"fits.outline to at least 21\.000"):
         sbafab.build(design.with_("chamber.diameter=8"))
     # A folder's design.toml names the chamber: it is the same design, and says the same.
     path = tmp_path / f"{design.name}.toml"

@@ -215,7 +215,7 @@ def test_simulate_exports_a_deck_and_refuses_what_is_no_key(tmp_path: Path) -> N
         ({"simulator": "calculix", "procedure": "slow"}, "must be one of dynamic, static"),
         ({"simulator": "calculix", "pressure": "6 kPa"}, "pressure = '6 kPa' must be a number"),
         ({"simulator": "mujoco", "minutes": 0}, "minutes = 0 must be a finite number above 0"),
-        ({"simulator": "sofa", "h": 0.3}, "h is for calculix; leave it out with sofa"),
+        ({"simulator": "sofa", "h": 0.3}, "h is for calculix; omit it with sofa"),
     ],
 )
 def test_simulate_names_what_a_setting_may_be(
@@ -252,7 +252,7 @@ def test_a_laminate_is_imported_as_a_design(tmp_path: Path) -> None:
     layers = [layer.profile for layer in sbafab.build("pouch").layers]
     assert [layer.profile for layer in sbafab.build(design).layers] == layers
     assert all(item.category is UserWarning for item in remarks)
-    with pytest.raises(OutputError, match="is there already"):
+    with pytest.raises(OutputError, match="already exists"):
         sbafab.import_design(source, tmp_path / "again.toml")
     with pytest.raises(DesignError, match="does not exist"):
         sbafab.import_design(tmp_path / "none")

@@ -33,12 +33,12 @@ generate brace --set parts.tube.on=cup | no tube can be fixed on a cup
 generate brace --waive seats | --waive 'seats': no rule has that name; did you mean seat
 generate brace --set parts=1 | add [parts.NAME]
 generate brace --set parts.arm.set.laser.kerf_tpe=0.1 | laser differs
-generate brace --decks | decks are of one design, and brace is an assembly
+generate brace --decks | decks need a single design, but brace is an assembly
 generate brace --target-yield 0.9 | generate its parts' designs one by one
 generate standing --copies 0 | order.copies = 0
 generate 3dof-15mm --set name=../x | name = '../x'
 generate 1dof-5mm --copies 1e3 | '1e3' is not a valid integer; see sbafab generate --help
-generate 1dof-5mm --chord-error 0.01 | goes with --dxf-profile chords
+generate 1dof-5mm --chord-error 0.01 | needs --dxf-profile chords
 predict 1dof-5mm --set models.calibration=lab.toml | sbafab calibrate writes one
 press brace | is an assembly of several designs
 mesh brace | is an assembly of several designs
@@ -93,7 +93,7 @@ predict radial-15mm --tip-load 3 | --tip-load is for elastic balloons, round poc
 predict brace --volume 5 | --volume is for one actuator
 predict brace --waive seat | --waive is for written files
 predict brace -o x | --out is for written files
-predict brace --pressure 5 --pressure 6 | an assembly is predicted at one pressure
+predict brace --pressure 5 --pressure 6 | an assembly needs a single pressure
 predict {OVAL} --volume 5 | --volume is for pockets that are round or oblong
 map 1dof-5mm --to a.csv --pressures 5 | is for a MuJoCo model
 map 1dof-5mm --to a.xml --pressures 5,5 | has 2 of 1 pressures
@@ -101,11 +101,11 @@ map 1dof-5mm --to a.xml --pressures x | must be a pressure such as
 map 1dof-5mm --to a.xml --pressures 200 | give 0 to 110 kPa
 map radial-15mm | no round pockets
 map 1dof-5mm --to map.txt | must end with .csv or .xml
-map 1dof-5mm --pressure 400 | 400 kPa is past the estimated burst pressure, 367 kPa
-map 1dof-5mm --pressure 0 | give more than 0 kPa
-calibrate nosuch | neither evidence that ships
-calibrate --name paper | which stands for another one
-calibrate --name none | which stands for another one
+map 1dof-5mm --pressure 400 | 400 kPa exceeds the estimated burst pressure of 367 kPa
+map 1dof-5mm --pressure 0 | it must be above 0 kPa
+calibrate nosuch | neither bundled evidence
+calibrate --name paper | which is reserved
+calibrate --name none | which is reserved
 calibrate --name "my lab" | use letters, digits
 find 1dof-5mm --max mass=1 --to tip.txt | tip.txt must end in .toml
 find 1dof-5mm --max mass=1 --to tip.toml -o out | --out names a folder and --to a file
@@ -127,30 +127,30 @@ find 1dof-5mm --min chamber.diamter=5 | did you mean chamber.diameter?
 find 1dof-5mm --min lumen=3 | 1dof-5mm has no lumen
 find 1dof-5mm --min inlet.tab_length=6 | --free inlet.tab_length=LOW:HIGH:STEP
 find 1dof-5mm --max deflated_diameter=3 | only radial designs
-find 1dof-5mm --free chamber.diameter=6:3:1 | --free 'chamber.diameter=6:3:1' stops below
+find 1dof-5mm --free chamber.diameter=6:3:1 | --free 'chamber.diameter=6:3:1' ends below
 find 1dof-5mm --free registration.method=ears,glue | 'glue' must be 'channel-pin' or 'ears'
-find 1dof-5mm --min registration.method=3 | is a word, 'channel-pin', and has no least or most
+find 1dof-5mm --min registration.method=3 | is a word, 'channel-pin', and cannot have a limit
 record | give the DESIGN that was built, --find or --report
 record 1dof-5mm | a result needs its serial
 record 1dof-5mm --serial A1 | A1 has no result; give leak
-record 1dof-5mm --report | DESIGN does not go with --report
-record --chart a.svg --serial A1 | --serial does not go with --chart
-record --report --leak pass | --leak does not go with --report
-record 1dof-5mm --serial A1 --withdraw | --withdraw does not go with DESIGN
-record 1dof-5mm --table x.csv --leak pass | --leak does not go with --table
+record 1dof-5mm --report | DESIGN cannot be combined with --report
+record --chart a.svg --serial A1 | --serial cannot be combined with --chart
+record --report --leak pass | --leak cannot be combined with --report
+record 1dof-5mm --serial A1 --withdraw | --withdraw cannot be combined with DESIGN
+record 1dof-5mm --table x.csv --leak pass | --leak cannot be combined with --table
 record 1dof-5mm --table x.csv | x.csv cannot be read
 record --correct 1 | give the correct result
-record --correct 1 --again | --again does not go with --correct
-record --correct x1 --leak pass | neither a record such as 3 nor an entry such as e3
+record --correct 1 --again | --again cannot be combined with --correct
+record --correct x1 --leak pass | neither a record, such as 3, nor an entry, such as e3
 record --correct e1 | give an --entry
 record --correct e1 --entry note=x --leak pass | give an --entry
 record --correct 1 --leak pass --entry note=x | give the correct result
 record --chart a.svg | lab.sqlite is not a file of records
 record 1dof-5mm --serial A1 --entry step | must be fields such as step=1
-record 1dof-5mm --serial A1 --entry "note='x" | a quotation mark without
+record 1dof-5mm --serial A1 --entry "note='x" | an unmatched quotation mark
 record 1dof-5mm --entry note=x | an entry needs its serial
 record 1dof-5mm --history x.doc | must end in .csv, .toml, .json
-record 1dof-5mm --serial A1 --leak pass --again | no attempt came before this
+record 1dof-5mm --serial A1 --leak pass --again | there is no earlier attempt
 record --correct 1 --leak fail | lab.sqlite does not exist
 record nosuch --serial A1 --leak pass | nosuch
 record 1dof-5mm --serial A1 --burst "3 N" | must be a pressure
@@ -239,6 +239,6 @@ def test_an_output_is_a_folder_everywhere(name: str, tmp_path: Path, run: Run) -
     assert "is a file, not a folder; choose a folder with -o" in run(f"{designs} -o file")[2]
     code, out, err = run(f"{designs} -o tip.toml")
     assert (code, out) == (2, "")
-    assert "is a file's name, and -o takes a folder" in err
+    assert "is the name of a file, but -o needs a folder" in err
     has_file = any("--to" in param.opts for param in COMMANDS[name].params)
     assert ("--to tip.toml" in err) == has_file

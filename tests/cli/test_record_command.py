@@ -114,7 +114,7 @@ def test_a_file_of_another_program_is_one_sentence(run: Run) -> None:
     code, _, err = run("record", "--report")
     assert code == 2
     assert err == (
-        "sbafab: lab.sqlite is a database of another program; name the lab's file with --lab\n"
+        "sbafab: lab.sqlite is another program's database; name the lab's file with --lab\n"
     )
     assert run("record", "--find", "A1", "--serial", "B")[0] == 2
 
@@ -136,7 +136,7 @@ def test_history_is_recorded_corrected_and_exported(run: Run) -> None:
     assert exported[:2] == (0, "a.csv: 1 device\n")
     assert Path("a.csv").read_text().count("\n") == 4
     _, out, err = run("record", "--find", "Z9")
-    assert "no record goes with 'Z9'" in err
+    assert "no record matches 'Z9'" in err
 
 
 def test_the_share_of_success_is_drawn(run: Run) -> None:

@@ -124,9 +124,9 @@ def test_each_is_there_alone(lead_ins: LeadIns) -> None:
         (
             rectangle((10.0, 10.0), (12.0, 12.0)),
             LeadIns(tab_width=1.0, tabs=2),
-            r"sheets.tpe.tabs = 2 of 1 mm have no room on the outline about x 11.0, y 11.0",
+            r"sheets.tpe.tabs = 2 of 1 mm do not fit on the outline about x 11.0, y 11.0",
         ),
-        (RING, LeadIns(tab_width=8.0, tabs=5), "ask for fewer or narrower tabs"),
+        (RING, LeadIns(tab_width=8.0, tabs=5), "use fewer or narrower tabs"),
     ],
 )
 def test_what_has_no_room_is_refused_with_its_place(

@@ -126,7 +126,7 @@ def test_a_kerf_is_read_as_it_was_told(kerf: Kerf | None, suffix: str) -> None:
     "width", ["", "x", "0.1 x nan", "0.1 x 0.1 x 0.1", "-0.1", "0.1 x 2", "nan"]
 )
 def test_a_kerf_that_cannot_be_is_refused(width: str) -> None:
-    with pytest.raises(OutputError, match="leaves open"):
+    with pytest.raises(OutputError, match="do not define"):
         kerf_of({"KERF_STATE": "compensated", "KERF_WIDTH": width})
 
 

@@ -131,7 +131,7 @@ def test_curves_leave_their_arcs_by_less_than_their_formula_says(tmp_path: Path)
     offs = [min(abs(math.hypot(x, y - c) - 400) for c in (0.0, 300.0)) for x, y in places]
     assert 1e-4 < max(offs) < 4.3e-6 * 400
     path.write_text(path.read_text().replace("B1 2", "L1 2"))
-    with pytest.raises(OutputError, match="differs from what was written"):
+    with pytest.raises(OutputError, match="differs from the written one"):
         verify_laser_file(path, "lightburn", sheet)
 
 
@@ -164,11 +164,15 @@ def once(old: str, new: str) -> Callable[[str], str]:
 
 FAULTS: list[tuple[str, Callable[[str], str], str]] = [
     ("rdworks", once(r" 62\n5\n 10", " 62\n1\n 10"), "is one of CUT_OUTER, not of CUT_INNER"),
-    ("rdworks", once(r" 62\n5\n 10", " 62\n3\n 10"), "has the colour 3, which no layer has"),
+    (
+        "rdworks",
+        once(r" 62\n5\n 10", " 62\n3\n 10"),
+        "has colour 3, which does not belong to a layer",
+    ),
     ("rdworks", once(r" 40\n4\.0", " 40\n4.002"), "is not the circle that was written"),
     ("rdworks", once(r"  0\nCIRCLE.*?(?=  0\n[CP])", ""), "it has 4 lines, not 5"),
-    ("rdworks", once(r"( 62\n1\n 10\n\d+\.\d)", r"\g<1>2"), "differs from what was written|circle"),
-    ("rdworks", once(r"42\n0\.414", "42\n0.424"), "differs from what was written"),
+    ("rdworks", once(r"( 62\n1\n 10\n\d+\.\d)", r"\g<1>2"), "differs from the written one|circle"),
+    ("rdworks", once(r"42\n0\.414", "42\n0.424"), "differs from the written one"),
     ("rdworks", lambda text: text[: len(text) // 2], "not a valid DXF|cannot be read"),
     ("rdworks", once("CIRCLE", "POINT"), "POINT .* cannot be cut"),
     (
@@ -177,11 +181,11 @@ FAULTS: list[tuple[str, Callable[[str], str], str]] = [
         r"not in millimetres: \$INSUNITS is 1",
     ),
     ("epilog", once("#0000ff", "#ff0000"), "is one of CUT_OUTER, not of CUT_INNER"),
-    ("epilog", once("#0000ff", "#00ff00"), "not hairlines in the colour of a layer"),
-    ("epilog", once("0.0254", "0.254"), "not hairlines in the colour of a layer"),
+    ("epilog", once("#0000ff", "#00ff00"), "not hairlines in a layer colour"),
+    ("epilog", once("0.0254", "0.254"), "not hairlines in a layer colour"),
     ("epilog", once('width="80mm"', 'width="80"'), "its page is not in millimetres"),
     ("epilog", once('r="4"', 'r="4.002"'), "is not the circle that was written"),
-    ("epilog", once("A8 8 0 0 0", "A8 8 0 0 1"), "differs from what was written"),
+    ("epilog", once("A8 8 0 0 0", "A8 8 0 0 1"), "differs from the written one"),
     ("epilog", once(r"<circle .*?/>\n", ""), "it has 4 lines, not 5"),
     ("epilog", lambda text: text[: len(text) // 2], "cannot be read"),
     ("lightburn", once(r"V(-?\d+\.\d\d)\d*", r"V\g<1>9999"), "differs from"),
@@ -204,12 +208,12 @@ FAULTS: list[tuple[str, Callable[[str], str], str]] = [
         once(r'<CutSetting type="Cut"><index Value="7".*?</CutSetting>', ""),
         "are others",
     ),
-    ("lightburn", once(r"([LB]\d+ 0)(</PrimList>)", r"\2"), "differs from what was written"),
-    ("lightburn", once(r'Type="Path"', 'Type="Bitmap"'), "type Bitmap that no sheet has"),
-    ("lightburn", once("<XForm>1 0 0 1", "<XForm>0 1 -1 0"), "turns or stretches a shape"),
-    ("lightburn", once(r"<VertList>V", "<VertList>W"), "says 'W"),
+    ("lightburn", once(r"([LB]\d+ 0)(</PrimList>)", r"\2"), "differs from the written one"),
+    ("lightburn", once(r'Type="Path"', 'Type="Bitmap"'), "type Bitmap, which sheets do not use"),
+    ("lightburn", once("<XForm>1 0 0 1", "<XForm>0 1 -1 0"), "rotates or scales a shape"),
+    ("lightburn", once(r"<VertList>V", "<VertList>W"), "has 'W"),
     ("lightburn", lambda text: text[: len(text) // 2], "cannot be read"),
-    ("lightburn", lambda text: "<svg/>", "no LightBurn project"),
+    ("lightburn", lambda text: "<svg/>", "not a LightBurn project"),
 ]
 
 

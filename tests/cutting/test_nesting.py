@@ -288,7 +288,7 @@ def test_a_part_that_fits_in_another_turn_only_is_no_error() -> None:
         (
             PLATE,
             Stock(spacing=40.0, pins=((76.2, 76.2, 3.0),)),
-            "no place 40 mm clear of the 1 sheets.tpe.pins",
+            "does not fit 40 mm clear of the 1 sheets.tpe.pins",
         ),
         # Nine coins a sheet of 32 usable mm: 30 take four sheets.
         (

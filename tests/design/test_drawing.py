@@ -79,7 +79,7 @@ def test_a_pattern_of_a_laminate_is_exact(tmp_path: Path) -> None:
     for layer in laminate.layers:
         assert read_drawing(path, layer.pattern).is_exactly(layer.profile)
     assert read_drawing(path, "outline").is_exactly(laminate.outline)
-    with pytest.raises(DesignError, match=r'laminate\.json has no pattern .P99.; there are "P01"'):
+    with pytest.raises(DesignError, match=r'laminate\.json has no pattern .P99.; use "P01"'):
         read_drawing(path, "P99")
     with pytest.raises(DesignError, match="is a laminate; name one of its patterns as layer"):
         read_drawing(path)

@@ -140,7 +140,7 @@ BAD = {
         "cuting_error =",
         r"registration.cuting_error is not a key of a kit; did you mean .*cutting_error\?",
     ),
-    "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive is a design's to say"),
+    "waiver": ("[rules]", '[rules]\nwaive = ["sealing"]', r"rules.waive belongs in a design"),
 }
 
 
@@ -183,7 +183,7 @@ def test_minutes_of_another_film_are_the_kits_alone(tmp_path: Path) -> None:
     assert said == "try the bond on a sample, and state press.bond_all_minutes in the kit"
     path.write_text(path.read_text().replace("temperature_c = ", "cool_minutes = "))
     with pytest.raises(
-        DesignError, match=r"minutes_for names TPU, and press.temperature_c is miss"
+        DesignError, match=r"minutes_for names TPU, but press.temperature_c is miss"
     ):
         load_design("1dof-5mm", changes)
     # The paper's own film keeps the paper's.

@@ -102,7 +102,7 @@ def assert_refused(document: dict[str, Any], words: str, folder: Path) -> None:
     path.write_text(json.dumps(document), encoding="utf-8")
     with pytest.raises(DesignError) as refused:
         read_laminate(path)
-    assert str(refused.value).startswith(f"{path} is not a sound laminate; ")
+    assert str(refused.value).startswith(f"{path} is not a valid laminate; ")
     assert words in str(refused.value)
 
 

@@ -53,7 +53,7 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
     "NaN": (lambda m: m.add_circle((0, math.nan), 4), "coordinate of x 0, y nan"),
     "tilted": (
         lambda m: m.add_circle((0, 0), 4, dxfattribs={"extrusion": (0, 1, 0)}),
-        "CIRCLE that is tilted",
+        "CIRCLE tilted",
     ),
     "degree": (
         lambda m: m.add_open_spline([(*p, 0) for p in [*ARROW, *ARROW]], degree=12),
@@ -66,7 +66,7 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
     ),
     "line that rises": (
         lambda m: [m.add_line(a, b) for a, b in pairwise(RISING)],
-        "LINE at z 3 where another point is at z 0; lay the whole outline flat",
+        "LINE at z 3, but another point at z 0; flatten the whole outline",
     ),
     "spline through points that rise": (
         lambda m: m.add_spline([(*p, p[0]) for p in [*ARROW, ARROW[0]]]),
@@ -77,13 +77,13 @@ BAD_DXF: dict[str, tuple[Callable[[Any], object], str]] = {
             m.add_arc((0, 0, 5), 4, 0, 180),
             m.add_arc((0, 0, 5), 4, 0, 180, dxfattribs={"extrusion": (0, 0, -1)}),
         ),
-        "ARC at z -5 where another point is at z 5",
+        "ARC at z -5, but another point at z 5",
     ),
     "ellipse that rises": (lambda m: m.add_ellipse((0, 0), (5, 1, 2), 0.4), "ELLIPSE at z 2"),
     "mesh": (lambda m: m.add_polymesh((3, 3)), "POLYLINE that is a mesh"),
     "invisible": (
         lambda m: m.add_circle((0, 0), 3, dxfattribs={"invisible": 1}),
-        "hidden entities only",
+        "only hidden entities",
     ),
     "blocks are not followed": (lambda m: m.add_blockref("POCKET", (0, 0)), "entity INSERT"),
 }
@@ -118,7 +118,7 @@ def test_a_long_svg_is_refused(tmp_path: Path, name: str) -> None:
 
 
 BAD_FILES = {
-    "text.dxf": (b"not a drawing", "not a sound DXF file"),
+    "text.dxf": (b"not a drawing", "not a valid DXF file"),
     "large.dxf": (b"0" * 5_000_001, "5,000,001 bytes"),
     "page.svg": (b"<html/>", "not an SVG"),
     "utf16.svg": ("<svg/>".encode("utf-16"), "UTF-8"),

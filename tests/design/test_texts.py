@@ -64,7 +64,7 @@ def test_a_control_character_is_refused(family: str, path: str) -> None:
     elif letter == "\ud800":
         assert "must be plain text" in said
     else:
-        assert f"remove the character U+{ord(letter[0]):04X} at place 2" in said
+        assert f"remove the character U+{ord(letter[0]):04X} at position 2" in said
 
 
 PART_TEXTS = [

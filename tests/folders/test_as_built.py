@@ -88,7 +88,7 @@ def test_chords_that_no_property_states_depart_from_the_design(doctor: Doctor) -
         (None, "design.toml is missing"),
         ("name = ", "design.toml cannot be used"),
         ('family = "cubic"', "design.toml cannot be used"),
-        ('family = "1dof"\nname = "x"\nbond.width = 9', "design.toml makes no laminate"),
+        ('family = "1dof"\nname = "x"\nbond.width = 9', "design.toml does not make a laminate"),
     ],
 )
 def test_without_a_usable_design_only_hashes_are_compared(

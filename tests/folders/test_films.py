@@ -144,9 +144,9 @@ def test_the_press_knows_what_melts(design: Design) -> None:
 
 
 def test_a_film_that_is_not_there_or_cannot_do_the_work_is_named(design: Design) -> None:
-    with pytest.raises(DesignError, match=r'layup.cap = .tpu. names no film; there are "tpe", "'):
+    with pytest.raises(DesignError, match=r'layup.cap = .tpu. is not a film; use "tpe", "'):
         build(design.with_("layup.cap=tpu"))
-    with pytest.raises(DesignError, match="is a mask film, and a cap is cut from a structural one"):
+    with pytest.raises(DesignError, match="is a mask film, but a cap needs a structural film"):
         build(design.with_("layup.cap=ptfe50"))
 
 

@@ -222,19 +222,19 @@ def test_an_imported_circuit_matches_its_own_file(tmp_path: Path) -> None:
 
 BAD: list[tuple[object, str]] = [
     ([], "is not a netlist; it is JSON with"),
-    ({"schema": "sbafab/nets@1"}, "nets must be an object of lists by name"),
-    ({"schema": "sbafab/nets@1", "nets": {"a": "b"}}, "nets.a must be a list of ports"),
+    ({"schema": "sbafab/nets@1"}, "nets must be an object with at least one named list"),
+    ({"schema": "sbafab/nets@1", "nets": {"a": "b"}}, "nets.a must be a list of at least one port"),
     ({"schema": "sbafab/nets@1", "nets": {"a": [1]}}, "nets.a[0] must be a name, or an object"),
     (
         {"schema": "sbafab/nets@1", "nets": {"a": ["p"], "b": ["p"]}},
-        "nets.b[0] names 'p', and so does nets.a",
+        "nets.b[0] names 'p', as does nets.a",
     ),
     (
         {"schema": "sbafab/nets@1", "nets": {"a": [{"name": "p", "at": [0, 0]}]}},
         'nets.a[0] must have "at": [x, y], "layers": [below, above]',
     ),
-    ({"connections": [{"id": "a", "source": {"port": "1"}}]}, "connections that are not"),
-    ({"connections": [3]}, "connections that are not ParchMint's"),
+    ({"connections": [{"id": "a", "source": {"port": "1"}}]}, "connections unknown to"),
+    ({"connections": [3]}, "connections unknown to ParchMint"),
 ]
 
 

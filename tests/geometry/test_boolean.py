@@ -148,7 +148,7 @@ def test_a_wrong_order_round_a_point_of_touch_is_found(monkeypatch: pytest.Monke
     monkeypatch.setattr(arrangement, "_by_side", lambda a, b: -right(a, b))
     with pytest.raises(InconsistentError):
         Arrangement(overlaid([[edge for region in pair for edge in region.edges]]))
-    with pytest.raises(GeometryError, match="change a size"):
+    with pytest.raises(GeometryError, match="change a dimension"):
         union(pair)
 
 
@@ -189,7 +189,7 @@ def test_arcs_stay_arcs() -> None:
 
 
 def test_an_open_chain_is_refused() -> None:
-    with pytest.raises(GeometryError, match="change a size"):
+    with pytest.raises(GeometryError, match="change a dimension"):
         laid_over([Line(AXIS, (1.0, 0.0)), Line((1.0, 0.0), (1.0, 1.0))])
 
 

@@ -104,8 +104,8 @@ CIRCLE = "  0\nCIRCLE\n  8\nCUT_OUTER\n 10\n50.0\n 20\n50.0\n 40\n1.0\n"
 FILES: dict[str, tuple[Change, str]] = {
     "large": (lambda path: os.truncate(path, 30_000_000), "larger than"),
     "zeros": (replaced(lambda path: path.write_bytes(b"\0" * 1_000_000)), "not an ASCII DXF"),
-    "circles": (drawing(CIRCLE), "entities and points, where at most"),
-    "lines": (drawing("  0\nLINE\n"), "entities and points, where at most"),
+    "circles": (drawing(CIRCLE), "entities and points; the limit is"),
+    "lines": (drawing("  0\nLINE\n"), "entities and points; the limit is"),
     "pipe": (replaced(os.mkfifo), "not a plain file"),
     "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "not a plain file"),
     "link to itself": (replaced(lambda path: path.symlink_to(path)), "not a plain file"),

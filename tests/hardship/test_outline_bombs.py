@@ -75,7 +75,7 @@ BOMBS: dict[str, tuple[Callable[[], str], str]] = {
         "outline",
     ),
     "zeros.dxf": (lambda: "0\n" * (SIZE // 2), "entities and settings"),
-    "entities.svg": (laughs, "declares a DOCTYPE or entities"),
+    "entities.svg": (laughs, "has a DOCTYPE or entities"),
     "paths.svg": (lambda: svg('<path d="M0 0L1 1"/>' * (SIZE // 20)), "more than 2000 elements"),
     "groups.svg": (lambda: svg("<g>" * 100_000 + "</g>" * 100_000), "more than 2000 elements"),
     "deep.svg": (lambda: svg("<g>" * 1900 + "</g>" * 1900), "no closed path"),

@@ -179,7 +179,7 @@ def test_the_command_writes_a_design_and_says_what_is_not_carried(
     again = importing(folder)
     assert again.exit_code == 2
     assert (
-        "1dof-5mm.toml is there already; move it, or name another place with -o or --to"
+        "1dof-5mm.toml already exists; move it, or choose another place with -o or --to"
         in again.output
     )
 

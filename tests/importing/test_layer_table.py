@@ -80,9 +80,9 @@ REFUSED = [
     ("cover", "lid", CHAMBERS, "layers.csv, line 4: drawing "),
     ("cover.svg", "cover.png", CHAMBERS, "line 4: file = 'cover.png' is no"),
     ("FILM,", "FILM,many", CHAMBERS, "line 2: pieces = 'many' must be a whole number"),
-    ("cap,,,\n", "cap,,,\na,b,c,d,e,f\n", CHAMBERS, "line 5 has 6 cells where the header has 5"),
-    ("", "", MOUTHLESS, "chambers.csv, line 2 has no mouth_x, of the first"),
-    ("", "", f"{CHAMBERS}pouch;5;5;;;;2\n", "line 3: width of pouch stands in an earlier"),
+    ("cap,,,\n", "cap,,,\na,b,c,d,e,f\n", CHAMBERS, "line 5 has 6 cells, but the header has 5"),
+    ("", "", MOUTHLESS, "chambers.csv, line 2 is the first row of pouch but has no mouth_x"),
+    ("", "", f"{CHAMBERS}pouch;5;5;;;;2\n", "line 3: width of pouch is given in an earlier"),
 ]
 
 
@@ -142,11 +142,11 @@ def test_yaml_of_foldable_robotics_is_read_alike(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("geom", "sentence"),
     [
-        ("LINESTRING (1 2, 3 4)", "layer 1, geometry 1 holds a LineString at x 1, y 2"),
+        ("LINESTRING (1 2, 3 4)", "layer 1, geometry 1 has a LineString at x 1, y 2"),
         ("POLYGON ((0 0, 4 4, 4 0, 0 4, 0 0))", "layer 1, geometry 1: Self-intersection[2 2]"),
         ("POLYGON", "layer 1, geometry 1 is 'POLYGON', which is not valid WKT"),
         (7, "layer 1 has no list of geoms as text"),
-        (None, "layer 1 holds no polygon; leave its row out"),
+        (None, "layer 1 has no polygon; omit its row"),
     ],
 )
 def test_a_geometry_that_is_no_polygon_is_named_at_its_place(

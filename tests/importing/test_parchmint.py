@@ -253,7 +253,7 @@ def test_a_netlist_alone_is_refused(importing: Importing, tmp_path: Path) -> Non
     for row in document["components"]:
         row["params"]["position"] = [0, 0]
     said = importing(saved(document, tmp_path)).output
-    assert "none of the 6 components has a place of its own" in said
+    assert "none of the 6 components has a distinct position" in said
     assert "place and route the circuit first" in said
 
 
@@ -279,10 +279,10 @@ def circuit_of_ports() -> dict[str, Any]:
 
 NO_CHAMBER = {
     "predict": ("predict", 0, "no inlet strip"),
-    "mesh": ("mesh", 2, "two-channels has no chamber, and these meshes"),
+    "mesh": ("mesh", 2, "two-channels has no chamber, which these meshes"),
     "decks": ("generate --decks", 0, "has no chamber"),
     "calculix": ("simulate --with calculix --export", 2, "the design has no chamber"),
-    "find": ("find --max outline_diameter=50", 2, "the search may change no key"),
+    "find": ("find --max outline_diameter=50", 2, "has no free key"),
 }
 
 

@@ -233,7 +233,7 @@ def test_every_layer_is_that_of_shapely_on_the_raw_coordinates(name: str, tmp_pa
     last = len(operations)
     for number, geometry in enumerate(judge, 1):
         if geometry.is_empty:
-            with pytest.raises(DesignError, match=f"layer {number} holds no area"):
+            with pytest.raises(DesignError, match=f"layer {number} has no area"):
                 cad_layer(path, f"{last}/{number}")
         else:
             region, _ = cad_layer(path, f"{last}/{number}")
@@ -319,7 +319,7 @@ def test_a_design_alone_says_what_is_missing_and_what_is_not_read(
     joint = operation(3, "JointOperation3", operation_links=links(parent=[2]))
     path = saved(tmp_path, design([drawn(1, 1), widened(2, 1, 1.0), joint], SKETCHES))
     said = importing(path).output
-    assert "hinge.cad holds 3 layers and not what they are for; write layers.csv" in said
+    assert "hinge.cad has 3 layers but not their roles; write layers.csv" in said
     assert '"hinge.cad,ROLE,OPERATION/NUMBER"' in said
     assert "operations that are not read: 3 (JointOperation3)" in said
 
@@ -327,15 +327,15 @@ def test_a_design_alone_says_what_is_missing_and_what_is_not_read(
 SIMPLIFIED = operation(2, "Simplify2", operation_links=links(parent=[1]))
 HOLED_BY = operation(1, "HoleOperation", "holes", operation_links="{}")
 UNREAD: dict[str, list[str]] = {
-    "hinge.cad, operation 2 (Simplify2): operations of class Simplify2 are not read": [
+    "hinge.cad, operation 2 (Simplify2): operations of class Simplify2 are not supported": [
         *(drawn(1, 1), SIMPLIFIED)
     ],
     # What rests on it is named by what it rests on.
-    "hinge.cad, operation 1 (holes): operations of class HoleOperation are not read": [
+    "hinge.cad, operation 1 (holes): operations of class HoleOperation are not supported": [
         *(HOLED_BY, combined(2, "union", [1], []))
     ],
-    "takes operation 2, which is not": [combined(1, "union", [2], []), drawn(2, 1)],
-    "operation 1 (SimpleSketchOp) takes a sketch that is not there": [drawn(1, 77)],
+    "refers to operation 2, which does not": [combined(1, "union", [2], []), drawn(2, 1)],
+    "operation 1 (SimpleSketchOp) refers to a missing sketch": [drawn(1, 77)],
     "operation 1 (SimpleSketchOp) is damaged; save the design again": [
         drawn(1, 1).replace("sketch: [1]", "sketch: 1")
     ],
@@ -346,7 +346,7 @@ UNREAD: dict[str, list[str]] = {
     "operation 3 (LaminateOperation2) takes the difference of lines that meet": [
         *(drawn(1, 3), drawn(2, 6), combined(3, "difference", [1], [2]))
     ],
-    "scales arcs by 1.5 along its line and 0.5 across it, and ellipses are not read": [
+    "scales arcs by 1.5 along its line and 0.5 across it, but ellipses are not supported": [
         *(drawn(1, 2), laid_by(2, 1, transformtype_y="custom", scaley=0.5))
     ],
 }
@@ -389,7 +389,7 @@ def test_values_put_in_at_random_are_refused_or_read(tmp_path: Path) -> None:
     ("text", "sentence"),
     [
         (POUCH.replace("{_basename", "{{_basename", 1), "is not valid YAML for popupCAD"),
-        ("layers: []", "hinge.cad contains no popupCAD design"),
+        ("layers: []", "hinge.cad is not a popupCAD design"),
     ],
 )
 def test_a_damaged_design_is_refused(
@@ -410,10 +410,13 @@ def test_no_object_is_made_and_no_code_is_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("layer", "sentence"),
     [
-        ("1", "layer '1' of hinge.cad is no OPERATION/NUMBER"),
-        ("lid/1", "'lid/1' of hinge.cad is no OPERATION/NUMBER; the operation is one of 1 to 4"),
+        ("1", "layer '1' of hinge.cad is not OPERATION/NUMBER"),
+        (
+            "lid/1",
+            "'lid/1' of hinge.cad is not OPERATION/NUMBER; the operation is a number from 1 to 4",
+        ),
         ("film/9", "hinge.cad has no layer '9'; its layers are 1 to 3"),
-        ("9/1", "the operation is one of 1 to 4"),
+        ("9/1", "the operation is a number from 1 to 4"),
     ],
 )
 def test_a_layer_that_is_not_there_is_refused(

@@ -55,11 +55,11 @@ TABLES = {
     "": "has no result; its first line names columns \\(serial, operator",
     "serial,leak\n": "has no result",
     "leak,burst_kpa\npass,3\n": "line 2: a result needs its serial",
-    "serial,burst\nA1,3\n": "line 2: 'burst' is none of serial",
+    "serial,burst\nA1,3\n": "line 2: 'burst' is not a column; use serial",
     "serial,leak,leak\nA1,pass,pass\n": "has two columns leak; keep one",
     "serial,leak\nA1,maybe\n": "line 2: leak = 'maybe' must be '', 'pass' or 'fail'",
     "serial,leak\nA1,\n": "line 2: A1 has no result; give leak",
-    "serial,burst_kpa\nA1,350,5\n": "line 2 has 3 cells where the header has 2",
+    "serial,burst_kpa\nA1,350,5\n": "line 2 has 3 cells, but the header has 2",
     "serial,burst_kpa\nA1,high\n": "line 2: burst_kpa = 'high' must be a number",
     "serial,turn_deg\nA1,0.5 90\n": r"line 2: turn_deg.1 = '90' must be at most 45",
 }
@@ -111,8 +111,8 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
     ]
     for name, text, says in (
         ("b.json", "[", "b.json cannot be read"),
-        ("b.toml", "entry = 1", "needs a list of tables called entry"),
-        ("b.csv", "serial,note\n", "holds no entry"),
+        ("b.toml", "entry = 1", "needs a list of tables named entry"),
+        ("b.csv", "serial,note\n", "has no entry"),
         ("b.doc", "", "must end in .csv, .toml, .json"),
     ):
         (tmp_path / name).write_text(text)
@@ -135,7 +135,7 @@ def test_files_of_every_kind_say_the_same(tmp_path: Path) -> None:
         ("serial=A1 decision=accept reason=leaks", "a reason goes with"),
         ("serial=A1 note=x date=4.5.2026", "must be a day such as 2026-05-04"),
         ("serial=A1 note=x date=20260504", "must be a day such as"),
-        ("serial=A1 colour=red", "'colour' is none of serial, date"),
+        ("serial=A1 colour=red", "'colour' is not a column; use serial, date"),
     ],
 )
 def test_a_line_that_cannot_be_meant_is_one_sentence(text: str, says: str) -> None:

@@ -130,7 +130,7 @@ def test_the_pins_of_a_sheet_give_the_scale(tmp_path: Path) -> None:
     # Without one of them the scale is not known: no pin is there, or the picture ends before it.
     for x, y in ((75.2, 26.0), (60.0, 60.0)):
         hidden = replace(sheet, pins=(*PINS[:2], (x, y, 2.0)))
-        with pytest.raises(DesignError, match=f"the pin at x {x:g}, y {y:g} mm is not seen"):
+        with pytest.raises(DesignError, match=f"the pin at x {x:g}, y {y:g} mm is not visible"):
             Inspection(Scan(read_picture(path), hidden, Reference(pins=True), False))
 
 

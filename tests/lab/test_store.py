@@ -48,7 +48,7 @@ def test_a_correction_is_a_row_of_its_own_that_names_the_other(lab: Lab) -> None
         (2, 1, "pass", 350.0),
     ]
     assert standing(records) == [new]
-    with pytest.raises(DesignError, match="record 1 is corrected by record 2 already"):
+    with pytest.raises(DesignError, match="record 1 is already corrected by record 2"):
         lab.correct(Record, 1, {"leak": "fail"})
     with pytest.raises(DesignError, match="no record 7"):
         lab.correct(Record, 7, {"leak": "fail"})
@@ -133,7 +133,7 @@ def torn(path: Path) -> None:
 
 
 DAMAGE = {
-    "another version": (changed("PRAGMA user_version = 3"), r"of version 3, this one reads 4"),
+    "another version": (changed("PRAGMA user_version = 3"), r"format 3; this version reads 4"),
     "pages": (torn, "is damaged"),
     "no table": (changed("DROP TABLE entry"), "cannot be used as a file of records: no such table"),
     "no JSON": (changed("UPDATE record SET content = '{'"), "is damaged"),
@@ -145,7 +145,7 @@ DAMAGE = {
     "no design": (changed("DELETE FROM design"), "is damaged"),
 }
 FOREIGN = {
-    "a database": (changed("CREATE TABLE photos (id)"), "is a database of another program"),
+    "a database": (changed("CREATE TABLE photos (id)"), "is another program's database"),
     "a table": (lambda path: path.write_text("serial\nA1\n" * 99), "is not a file of records"),
     "a folder": (lambda path: path.mkdir(), "cannot be opened"),
 }
@@ -238,7 +238,7 @@ def test_lines_of_history_are_corrected_and_not_repeated(lab: Lab) -> None:
     assert (new.id, new.corrects, new.serial, new.step) == (3, 1, "A1", "1")
     assert new.readings == {"temperature_c": 135.0, "minutes": 20.0}
     assert [entry.id for entry in standing(lab.contents().entries)] == [2, 3]
-    with pytest.raises(DesignError, match="entry e1 is corrected by entry e3 already"):
+    with pytest.raises(DesignError, match="entry e1 is already corrected by entry e3"):
         lab.correct(HistoryEntry, 1, {"note": "again"})
     with pytest.raises(DesignError, match="A2 has this line already, entry e2"):
         lab.add(SHA, None, [step("A2")])

@@ -125,7 +125,9 @@ def test_a_press_that_melts_the_open_faces_of_a_seam_is_refused() -> None:
     cold = replace(COATED, softens_above=110.0)
     layers = tuple(replace(layer, film=cold) for layer in stack.layers)
     stack = replace(stack, layers=layers, seams=(seam("a", 1, 2, 8, 1),), bonds=cool)
-    with pytest.raises(DesignError, match="135 would weld layers 1 and 2 all over, which seam a"):
+    with pytest.raises(
+        DesignError, match="135 would weld the whole area of layers 1 and 2, which seam a"
+    ):
         schedule(stack, load_design("1dof-5mm"))
     hot = replace(stack, bonds=(replace(WELD, temperature_c=180.0), cool[1]))
     assert [step.step for step in schedule(hot, load_design("1dof-5mm")).seams] == [1]

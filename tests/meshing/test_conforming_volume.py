@@ -103,7 +103,7 @@ def test_base_tip_and_inlet_are_where_they_belong(meshes: ConformingMeshes) -> N
     ("settings", "message"),
     [
         (MeshSettings(h=0.8), "ask for 0.750 mm at most"),
-        (MeshSettings(h=0.0), "not a size for a mesh"),
+        (MeshSettings(h=0.0), "not a valid mesh size"),
         (MeshSettings(h=0.002), "more than 3,000,000"),
         (MeshSettings(h=0.5, symmetry="sector"), "symmetry sector is not"),
     ],
@@ -122,7 +122,7 @@ def test_faulty_meshes_are_found(meshes: ConformingMeshes) -> None:
         check_mesh(replace(meshes.volume, cells=cells), {})
     mesh = meshes.volume
     name = "film_007_TPE_cap"
-    with pytest.raises(OutputError, match="ask for a smaller h"):
+    with pytest.raises(OutputError, match="use a smaller h"):
         check_mesh(mesh, {name: held(mesh, name) * 1.002})
     # Two wedges that meet along one edge only.
     fan = mesh.cells[mesh.cell_sets[name]]

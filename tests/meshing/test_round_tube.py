@@ -108,7 +108,7 @@ def test_balloons_that_meet_or_lie_in_their_sheet_are_refused() -> None:
     heights = flat(stack)
     points = stack.plane.points * np.array([1.3, 1.0])
     wide = replace(stack, plane=stack.plane._replace(points=points))
-    with pytest.raises(DesignError, match=r"filled balloons meet round the tube of 8\.2 mm"):
+    with pytest.raises(DesignError, match=r"filled balloons meet around the tube of 8\.2 mm"):
         formed(wide, heights)
     above = np.arange(len(heights))[:, None] > 0
     with pytest.raises(OutputError, match=r"film 3 would pass through one below it by 0\.10 mm"):

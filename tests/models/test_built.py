@@ -63,7 +63,7 @@ def test_a_value_as_predicted_moves_nothing_and_narrows(before: Prediction) -> N
         ("stroke@10kPa=0mm", "must be above 0"),
         ("stroke@10kPa=two", "'two'"),
         ("strok@10kPa=16mm", "'strok@10kPa'"),
-        ("width=20mm", "no calibrated model gives the width"),
+        ("width=20mm", "no calibrated model predicts the width"),
         ("chamber.diameter=5", "is of the drawing"),
         (
             "height@10kPa=30mm",
@@ -99,7 +99,7 @@ def test_a_serial_stands_for_what_is_recorded_of_it(
     assert written["asked"]["measured"] == ["force@0mm@100kPa=4.5N", "height=1.1mm"]
     code, _, error = run_predict([NAME, "--serial", "A-04", *out], capsys)
     assert code == 2
-    assert "has no force and no height of A-04" in error
+    assert "has neither force nor height of A-04" in error
 
 
 def test_a_weight_on_the_tip_lowers_it_as_the_stack_says() -> None:

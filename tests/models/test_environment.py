@@ -96,5 +96,5 @@ def test_many_that_reach_their_target_begin_anew() -> None:
     assert info["time"].tolist() == [0.0, 1.0]
     with pytest.raises(DesignError, match="num_envs = 0"):
         ReachVectorEnvironment(stack, 0)
-    with pytest.raises(DesignError, match="give a seed, or 2"):
+    with pytest.raises(DesignError, match="give one seed, or 2"):
         many.reset(seed=[1, 2, 3])

@@ -302,7 +302,7 @@ def test_an_unknown_name_is_met_with_the_nearest_each_once(three: Prediction) ->
         three.value("blocked_forc")
     with pytest.raises(DesignError, match="did you mean force"):
         three.relation("forces")
-    with pytest.raises(DesignError, match="no quantity has the key 'weight'"):
+    with pytest.raises(DesignError, match="there is no quantity 'weight'"):
         three.value("weight")
 
 

@@ -124,7 +124,7 @@ def test_a_pad_that_does_not_reach_the_base_plate_is_refused() -> None:
 
 
 def test_a_pad_has_its_own_heat_limit(stack: Stack) -> None:
-    with pytest.raises(DesignError, match="more than the press pad of silicone sponge stands"):
+    with pytest.raises(DesignError, match="exceeds the limit of a press pad of silicone sponge"):
         schedule(stack(2), PAPER.with_("press.temperature_c=210"))
 
 

@@ -158,7 +158,7 @@ def test_the_shop_is_told_of_its_holes() -> None:
 
 
 def test_pins_or_plate_that_do_not_do_are_refused(stack: Stack) -> None:
-    with pytest.raises(DesignError, match=r"at least \d\.\d+ mm long .* longest there is has 3"):
+    with pytest.raises(DesignError, match=r"at least \d\.\d+ mm long .* longest available is 3"):
         schedule(stack(15), PAPER.with_("registration.pin_lengths=[3]"))
     with pytest.raises(DesignError, match=r"press.plate_thickness = 2 is thinner than the 3\.\d+"):
         schedule(stack(15), PAPER.with_("press.plate_thickness=2"))

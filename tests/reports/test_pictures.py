@@ -216,7 +216,7 @@ def test_the_command_says_what_it_drew_and_refuses_in_a_sentence(tmp_path: Path)
     with Image.open(tmp_path / "a.png") as image:
         assert image.size == (120, 96)
     for extra, sentence in (
-        (["--pressure", "arm=5"], "chamber arm is not there; the chambers are chamber1"),
+        (["--pressure", "arm=5"], "chamber arm does not exist; the chambers are chamber1"),
         (["--pressure", "5", "--volume", "5"], "give --pressure or --volume, not both"),
         (["--pressure", "400", "--to", str(tmp_path / "b.png")], "burst pressure"),
         (["--to", str(tmp_path / "no" / "a.png")], "no such file or directory"),

@@ -133,8 +133,8 @@ RULE = Rule({name!r}, check, Explanation("", "", ""))
         ),
         ("RULE = 3", ("mine",), "(broken:RULE is not a Rule); repair or uninstall that package"),
         ("x = 3", ("mine",), "has no attribute 'RULE'"),
-        (RULE.format(name="other"), ("mine",), "calls itself other"),
-        (RULE.format(name="sealing"), ("sealing",), "rule sealing is there already; uninstall"),
+        (RULE.format(name="other"), ("mine",), "names itself other"),
+        (RULE.format(name="sealing"), ("sealing",), "rule sealing already exists; uninstall"),
     ],
 )
 def test_a_rule_that_cannot_be_loaded_passes_no_design(

@@ -421,8 +421,8 @@ def test_a_finding_in_words(good: Build) -> None:
     assert (found.id, found.verdict, found.by_user) == ("bond-width.narrowest-fail", "waived", True)
     assert found.message == (
         "waived by the design: the narrowest bond is 0.650 mm, at chamber interface 5 (layers 9 "
-        "and 11), x 2.925, y 0.000; it needs 0.7: raise bond.width, or move the edges on either "
-        "side apart there; limits lowered: bond_width 0.7 (paper 0.75)"
+        "and 11), x 2.925, y 0.000; it needs 0.7: increase bond.width, or move the edges "
+        "apart there; limits lowered: bond_width 0.7 (paper 0.75)"
     )
     pinned = mask_overhang.check(Measures(good(*ONE), PAPER))[-1]
     assert pinned.message == (

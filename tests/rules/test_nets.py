@@ -67,8 +67,8 @@ def test_a_cut_channel_is_one_open() -> None:
     first = findings[0]
     assert (first.verdict, first.where.interface, first.where.layers) == ("fail", 1, (1, 2, 3))
     assert (first.where.x, first.where.y) == pytest.approx((10.0, 4.0), abs=0.5)
-    assert first.message.startswith("net a is open: q is not joined to p; they come nearest at ")
-    assert "1.000 mm of bond lie between: join them" in first.message
+    assert first.message.startswith("net a is open: q is not joined to p; they are nearest at ")
+    assert "1.000 mm of bond separates them; join them there" in first.message
     # Each half is a void with a port at its end, and no branch of another.
     assert len(findings) == 2
 
@@ -83,7 +83,7 @@ def test_a_channel_too_narrow_to_open_fails_at_its_neck() -> None:
     assert joined.verdict == "pass"
     assert (opening.verdict, opening.where.interface) == ("fail", 1)
     assert (opening.where.x, opening.where.y) == pytest.approx((10.0, 4.0), abs=1.0)
-    assert "is drawn 0.200 mm wide" in opening.message
+    assert "is 0.200 mm wide as drawn" in opening.message
     wider = LIMITS.with_("rules.opening_pressure_kpa=10000")
     assert check(Measures(laminate_of(routes), wider))[1].verdict == "pass"
 
@@ -179,7 +179,7 @@ def test_sealing_leaves_the_voids_to_nets() -> None:
     (finding,) = sealing.check(Measures(laminate, LIMITS))
     assert (finding.verdict, finding.message) == (
         "pass",
-        "no film is loose; what the voids join is judged by nets",
+        "no film is loose; the rule nets checks what the voids connect",
     )
 
 
@@ -205,7 +205,7 @@ def test_ends_one_above_the_other_come_before_a_crossing() -> None:
     faults = connectivity(laminate_of(routes), LIMITS).faults
     (fault,) = [each for each in faults if each.kind == "open"]
     assert math.dist(fault.at, (16, 4)) < NEAR
-    assert "layer 3 has no hole there" in fault.message
+    assert "layer 3 has no hole;" in fault.message
 
 
 def test_an_inlet_that_is_cut_off_is_told_from_its_pocket() -> None:
@@ -264,5 +264,5 @@ def test_a_name_that_the_design_lacks_gets_the_nearest_or_what_to_give() -> None
     where = "which is not a port or chamber of the design"
     assert lacking == [
         f"nets.json names ss, {where}; did you mean s?",
-        f"nets.json names outlet, {where}; give its layers and its place, or correct it",
+        f"nets.json names outlet, {where}; give its layers and its position, or correct it",
     ]

@@ -277,7 +277,7 @@ def test_a_failure_tells_what_is_left_without_the_hand(good: Good) -> None:
         # 0.75 - 2 x 0.2 - 2 x 0.004, and likewise from 0.5; less than nothing is reported as none.
         assert dict(facts(found)["firm"].facts)["value"] == pytest.approx(firm)
         assert found.measured == 0.0
-        assert "at worst nothing is left of the " in found.message
+        assert "at worst nothing remains of the " in found.message
 
 
 def test_what_is_short_as_drawn_says_so(good: Good) -> None:
@@ -382,8 +382,8 @@ def test_cutting_and_pins_both_narrow_a_hole(good: Good) -> None:
     limits = PAPER.with_("registration.cutting_error=0.01", "registration.pin_error=0.02")
     [loose] = pin_fit.check(Measures(good("1dof-5mm", "bore.pin_diameter=0.6"), limits))
     assert (loose.id, loose.verdict, loose.measured) == ("pin-fit.fit", "pass", 0.0)
-    assert "(0.332 mm to spare at worst)" in loose.message
-    assert "may come out 0.940 mm wide" in loose.message
+    assert "(clearance 0.332 mm at worst)" in loose.message
+    assert "may be cut 0.940 mm wide" in loose.message
     [tight] = pin_fit.check(Measures(good("1dof-5mm", "bore.pin_diameter=0.99"), limits))
     assert (tight.id, tight.verdict) == ("pin-fit.fit", "pass")
     # Findings are rounded to the sixth digit.

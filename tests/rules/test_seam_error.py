@@ -46,8 +46,8 @@ def test_a_tool_that_strays_too_far_fails() -> None:
     bond, _ = findings(WORST_CASE, registration__seam_error=1.6)
     assert bond.verdict == "fail"
     assert bond.measured == pytest.approx(0.2)
-    assert "place of seam" in bond.message
-    assert "make the seam wider, or run it farther past the edge" in bond.message
+    assert "position of seam" in bond.message
+    assert "make the seam wider, extend it farther past the edge" in bond.message
 
 
 def test_by_default_a_laser_is_as_exact_as_its_cuts_and_other_tools_are_not() -> None:

@@ -160,7 +160,7 @@ def test_a_chamber_is_parted_where_seams_close_a_channel(gap: float, verdict: st
     (found,) = run_rule(SEALING, Measures(build(design), design))
     assert found.verdict == verdict
     if verdict == "fail":
-        assert "a may be parted at chamber interface 1" in found.message
+        assert "a may be divided at chamber interface 1" in found.message
         assert (found.where.x, found.where.y) == pytest.approx((0, 0), abs=0.1)
 
 

@@ -62,7 +62,7 @@ def test_rules_that_differ_have_their_margins() -> None:
     same = compare(design, design)
     assert (same.keys, same.rules) == ((), ())
     assert not any(pair.differs for pair in same.figures)
-    with pytest.raises(DesignError, match="one pressure or more"):
+    with pytest.raises(DesignError, match="at least one pressure"):
         compare(design, design, pressures_kpa=[])
 
 

@@ -222,7 +222,7 @@ def test_where_nothing_meets_all_the_nearest_miss_is_said(tmp_path: Path) -> Non
     target.write_text("mine")
     ended = run(*asked, to=target)
     assert ended.exit_code == 2
-    assert "exists and is not overwritten" in ended.output
+    assert "exists; choose another folder" in ended.output
     assert "trying designs" not in ended.output
     assert target.read_text() == "mine"
 

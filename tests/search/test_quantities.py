@@ -60,12 +60,12 @@ bend@0chambers | neither a pressure nor a length
 force@2chambers@1mm | neither a pressure nor a length
 force@12.5@50kPa | 12.5kPa or 12.5mm
 mass@50kPa | only stroke, bend, force, lateral_stiffness, pull
-time@5kPa | a time takes one flow, such as time@35ml/min
+time@5kPa | a time has one flow, such as time@35ml/min
 time@0ml/min | must be from
-bend@5mm | only a force takes one
-stroke@50% | only a force takes one
-force@50%@5mm | needs one stroke
-force@50kPa | a force needs one stroke
+bend@5mm | other quantities have none
+stroke@50% | other quantities have none
+force@50%@5mm | needs exactly one stroke
+force@50kPa | a force needs exactly one stroke
 force@150% | must be a fraction from 0 to 1
 stroke@1001kPa | give more than 0, at most 1000 kPa
 stroke@-5kPa | a vacuum does nothing
@@ -257,9 +257,9 @@ def test_a_share_of_no_stroke_needs_no_reference() -> None:
     [
         ("lumen", "1dof-5mm", "has no lumen"),
         ("bend@5kPa", "1dof-5mm", "does not bend"),
-        ("bend@3chambers@5kPa", "3dof-15mm", "a bend is of at most 2 of them"),
-        ("pull@1kPa", "finger", "pull is of a pouch-motor, and the design has a mecha"),
-        ("push@1kPa", "1dof-5mm", "push is of a push, and the design has no mechanism"),
+        ("bend@3chambers@5kPa", "3dof-15mm", "a bend needs at most 2 filled"),
+        ("pull@1kPa", "finger", "pull needs a pouch-motor, but the design has a mecha"),
+        ("push@1kPa", "1dof-5mm", "push needs a push, but the design has no mechanism"),
         ("pull@10kPa", "pouch", "the film would stretch by more than 5 %"),
     ],
 )

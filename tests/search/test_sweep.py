@@ -236,7 +236,7 @@ def test_a_table_that_no_sweep_wrote_is_left_alone(
         _swept(tmp_path)
     assert (folder / "sweep.csv").read_text() == "mine"
     (folder / "manifest.json").write_text("{}")
-    with pytest.raises(OutputError, match="holds a design of that name"):
+    with pytest.raises(OutputError, match="contains a design of that name"):
         _swept(tmp_path)
 
 

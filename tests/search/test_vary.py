@@ -53,11 +53,11 @@ REFUSED: list[tuple[Any, str]] = [
     ("a=1:2:-1", "STEP = -1"),
     ("a=1:x:1", "must be a length"),
     ("a=1:2:3:4", "START:STOP:STEP"),
-    ("a=0:1000:0.001", "at most 10,000"),
+    ("a=0:1000:0.001", "the limit is 10,000"),
     ("a=3,4,3", "3 twice"),
-    ({"a": []}, "vary has no value for a"),
-    ({"a": [3, np.int64(3)]}, "names 3 twice"),
-    ({"a": np.arange(10_001)}, "a has 10,001 values, and at most 10,000"),
+    ({"a": []}, "vary has no values for a"),
+    ({"a": [3, np.int64(3)]}, "lists 3 twice"),
+    ({"a": np.arange(10_001)}, "a has 10,001 values; the limit is 10,000"),
     ({"a": "8:4"}, "smaller number first"),
 ]
 
@@ -106,7 +106,7 @@ def test_a_grid_has_every_combination_once() -> None:
     assert found == [(1, "x"), (1, "y"), (2, "x"), (2, "y"), (3, "x"), (3, "y")]
     with pytest.raises(DesignError, match="has no step"):
         grid([read_varied("a=1:2")])
-    with pytest.raises(DesignError, match="at most 100,000"):
+    with pytest.raises(DesignError, match="the limit is 100,000"):
         grid([Free.of_choices(key, range(1000)) for key in "ab"])
 
 

@@ -139,7 +139,7 @@ def test_results_end_where_a_chamber_would_hold_less_than_no_air(
     assert len((tmp_path / "run" / "history.csv").read_text().splitlines()) == 1 + 2
     # The first result itself.
     stand_in("ccx", GIVES_UP.replace("time * height", "-8 * time * height"))
-    with pytest.raises(VoidError, match=r"at 0\.5 kPa, cannot be: chamber1 holds -"):
+    with pytest.raises(VoidError, match=r"at 0\.5 kPa, is impossible: chamber1 holds -"):
         simulate(laminate, mesh, settings, tmp_path / "void", 300, lambda *_: None)
     assert not (tmp_path / "void" / "history.csv").exists()
     stand_in("ccx", 'print("*ERROR in nothing: no memory left.")\nraise SystemExit(201)')

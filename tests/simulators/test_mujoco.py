@@ -173,7 +173,7 @@ def test_a_run_that_goes_wrong_is_not_believed(
     request = SimulationRequest(seconds=2)
     films = export(sbafab.build(*BALLOON), request, tmp_path, 8)
     spoil(tmp_path, *change)
-    with pytest.raises(OutputError, match=rf"did not run to its end: its log says .*({words})"):
+    with pytest.raises(OutputError, match=rf"ended prematurely: its log says .*({words})"):
         inflate(films, request, tmp_path, ignore_progress)
 
 

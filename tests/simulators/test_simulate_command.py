@@ -67,7 +67,7 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
         (["--with", "calculix", "--minutes", "nan"], "must be a finite number"),
         (["--with", "ansys"], "calculix"),
         (["--with", "calculix", "--pressure", "2000"], "pressure of chamber1 = 2000 kPa"),
-        (["--with", "calculix", "--symmetry", "sector"], "symmetry sector is not this laminate's"),
+        (["--with", "calculix", "--symmetry", "sector"], "lacks the mesh symmetry sector"),
         (["--with", "sofa", "--pressure", "0"], "0 kPa in every chamber"),
         (["--with", "mujoco", "--pressure", "-5"], "to 1000 kPa; a vacuum is for calculix"),
         (["--with", "sofa", "--scene", "volume", "--volume", "left=3"], "left"),
@@ -90,7 +90,7 @@ def test_bad_arguments(tmp_path: Path, options: list[str], words: str) -> None:
         (["--with", "calculix", "--pressure", "20"], "a vacuum is negative: write -20"),
         (["--with", "calculix", "--chamber", "stack=20"], "stack = 20 kPa is out of range"),
         (["--with", "calculix", "--pressure", "-102"], "must be from -101.325 to"),
-        (["--with", "sofa"], "works under a vacuum, and sofa takes none; take calculix"),
+        (["--with", "sofa"], "works under vacuum, which sofa does not support; use calculix"),
     ],
 )
 @pytest.mark.usefixtures("no_programs")

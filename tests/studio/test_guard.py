@@ -106,7 +106,7 @@ def test_a_name_too_long_for_a_file_is_one_sentence(client: Client, letters: str
     for answer in answers:
         told = answer.json()["message"]
         assert told.endswith(
-            f"has {len(name.encode())} bytes, of a design file at most 240; shorten it"
+            f"has {len(name.encode())} bytes; the limit for a design file is 240; shorten it"
         )
     longest = "a" * 235 + ".toml"
     saved = client.post("/api/save", json={"name": longest, "text": "# a"}, headers=HEADERS)

@@ -90,7 +90,7 @@ def test_lines_are_stored_with_their_photograph(client: Client, folder: Path) ->
 @pytest.mark.parametrize(
     ("body", "says"),
     [
-        ({"design": "two.toml", "entries": []}, "no line is filled in"),
+        ({"design": "two.toml", "entries": []}, "nothing is filled in"),
         ({"design": "two.toml", "entries": [{"serial": "A1"}]}, "an entry states a lot"),
         (
             {"design": "two.toml", "entries": [{"serial": "A1", "step": "1", "minutes": "long"}]},

@@ -171,7 +171,7 @@ def test_a_file_is_read_as_it_was_written(paper: ModelCalibration, tmp_path: Pat
 
 
 def test_a_name_that_is_none_says_what_there_is(tmp_path: Path) -> None:
-    with pytest.raises(DesignError, match='neither "none", nor one that ships'):
+    with pytest.raises(DesignError, match='neither "none", nor a bundled one'):
         load_calibration("papers", tmp_path)
 
 

@@ -168,7 +168,7 @@ def test_a_file_is_read_with_its_name_as_id(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("before", "after", "words"),
     [
-        ('"force_n"', '"force"', "quantity 'force', which is not known; did you mean force_n?"),
+        ('"force_n"', '"force"', "unknown quantity 'force'; did you mean force_n?"),
         ('"height_share"', '"volume_ul"', "x_name = 'volume_ul', which is not an axis of force_n"),
         ("x = [0, 0.5]", "x = [0]", "has 1 x for 2 y; give one for each"),
         ("[0.1, 0.1]", "[0.1]", "has 1 absolute errors for 2 y"),
@@ -179,7 +179,7 @@ def test_a_file_is_read_with_its_name_as_id(tmp_path: Path) -> None:
         ('place = "bench"', 'place = "bench"\ncomparable = false', "without a reason"),
         ('place = "bench"', 'place = "bench"\ncolour = 1', "colour"),
         ('"sbafab/evidence@1"', '"sbafab/kit@1"', "schema"),
-        (HEAD, HEAD + CURVE, "has two curves 'force'; give each its id"),
+        (HEAD, HEAD + CURVE, "has two curves 'force'; give each a unique id"),
     ],
 )
 def test_faults_of_a_file_are_one_sentence(
@@ -198,7 +198,7 @@ def test_faults_of_a_file_are_one_sentence(
 
 
 def test_no_such_source_says_what_there_is() -> None:
-    with pytest.raises(DesignError, match=r"neither evidence that ships .*mean paper\?"):
+    with pytest.raises(DesignError, match=r"neither bundled evidence .*mean paper\?"):
         load_evidence("papr")
     with pytest.raises(DesignError, match="cannot be read"):
         load_evidence("none-here.csv")
@@ -232,14 +232,14 @@ def test_a_cell_of_the_curve_may_stand_in_any_row(tmp_path: Path) -> None:
     ("text", "words"),
     [
         ("", "has no column quantity"),
-        ("quantity,y\n", "has no row below its columns"),
+        ("quantity,y\n", "has no rows below its header"),
         ("quantity,y,z\nforce_n,1,2\n", "has a column 'z'"),
         ("quantity,y,y\n", "has two columns y"),
         ("quantity,x\nforce_n,1\n", "has no column y"),
-        ("quantity,y\nforce_n,1,2\n", "line 2 has 3 cells where the header has 2"),
+        ("quantity,y\nforce_n,1,2\n", "line 2 has 3 cells, but the header has 2"),
         ("quantity,y\nforce_n,\n", "line 2 has no y"),
         ("quantity,y\nforce_n,high\n", "line 2: y is 'high', not a number"),
-        ("quantity,y\n,1\n", "line 2 names no curve and no quantity"),
+        ("quantity,y\n,1\n", "line 2 has neither curve nor quantity"),
         ("curve,quantity,y\na,,1\n", "quantity is missing"),
         ("quantity,y,tip\nforce_n,1,loose\n", "tip = 'loose' must be"),
         ("quantity,y,runs\nforce_n,1,1.5\n", "runs is '1.5'; it must be a whole number"),
@@ -247,7 +247,7 @@ def test_a_cell_of_the_curve_may_stand_in_any_row(tmp_path: Path) -> None:
         ("curve,quantity,y\na b,force_n,1\n", "id = 'a b' must"),
         (
             "quantity,y,fluid\nforce_n,1,air\nforce_n,2,water\n",
-            "fluid is 'water', and 'air' in an earlier line",
+            "fluid is 'water', but 'air' in an earlier line",
         ),
     ],
 )

@@ -1,8 +1,8 @@
-"""Films lifted by an equal amount of air in every balloon, and balloons set on each other.
+"""Films lifted by an equal amount of air in every balloon, and balloons stacked.
 
 The lift is vertical in the flat laminate's frame, so no element changes its volume. Balloons are
-then stacked by their neck discs. Films stretch along the meridian (1 % at 5 ul in the paper's 5 mm
-balloon) and thin accordingly; the flat mesh is the rest position for a solver that takes one.
+then stacked on their neck discs. Films stretch along the meridian (1 % at 5 ul in the paper's 5 mm
+balloon) and thin accordingly; the flat mesh is the rest position for solvers that use one.
 """
 
 from __future__ import annotations
@@ -28,9 +28,10 @@ from sbafab.models.closed_forms import eqs_1_to_3, lens
 
 
 class Lift(NamedTuple):
-    """Shape (plane nodes,) in mm2 of a film over a pocket under even pressure.
+    """Shape (plane nodes,) in mm2 of a film over a pocket under uniform pressure.
 
-    ``plateau`` is its height at the (first) neck disc, 0 without one, ``volume`` what it encloses.
+    ``plateau`` is its height at the (first) neck disc, 0 without one, ``volume`` the enclosed
+    volume.
     """
 
     shape: Floats
@@ -41,7 +42,7 @@ class Lift(NamedTuple):
 def lift(plane: Plane, pocket: Flags, fixed: Ints, discs: list[Ints]) -> Lift:
     """Return the rise of the film over a pocket: -lap w = 1, w = 0 at the ``fixed`` nodes.
 
-    ``discs`` are the nodes of each neck: they rise together. For a round pocket without a neck
+    ``discs`` are the nodes of each neck, which rise together. For a round pocket without a neck
     this is the paraboloid of the paper's Eq. 1.
     """
     try:
@@ -83,8 +84,8 @@ class Pocket(NamedTuple):
     """One pocket of a chamber, under film ``ply``, with the lift of the films below and above.
 
     ``centres`` are its stacks, as indices of the layup's centres. ``meshed`` is the number of its
-    balloons that are meshed, as a sum of shares; ``flat_ul`` is the volume of the meshed part
-    before filling, ``largest_ul`` the most air that a balloon can hold.
+    balloons that are meshed, as a sum of fractions; ``flat_ul`` is the volume of the meshed part
+    before filling, ``largest_ul`` the largest volume of air in a balloon.
     """
 
     chamber: str
@@ -98,27 +99,27 @@ class Pocket(NamedTuple):
     largest_ul: float
 
     def pressure(self, ul: float) -> float:
-        """The factor of both shapes, in 1/mm, at which each balloon holds ``ul``.
+        """Return the factor of both shapes, in 1/mm, at which each balloon holds ``ul``.
 
         Raises DesignError if a balloon cannot hold that much.
         """
         if ul > self.largest_ul:
             raise DesignError(
                 f"fill of {self.chamber} = {ul:g} ul is more than the balloon under layer "
-                f"{self.layer} can hold with a film of constant length: "
-                f"ask for {math.floor(self.largest_ul * 100) / 100:.2f} ul at most"
+                f"{self.layer} can hold with a film of constant length; use at most "
+                f"{math.floor(self.largest_ul * 100) / 100:.2f} ul"
             )
         added = ul * self.meshed - self.flat_ul
         if ul and added < 0:
             raise DesignError(
                 f"fill of {self.chamber} = {ul:g} ul is less than the gaps between flat films "
-                f"hold; ask for {self.flat_ul / self.meshed:.2f} ul or more"
+                f"hold; use at least {self.flat_ul / self.meshed:.2f} ul"
             )
         return added / (self.lower.volume + self.upper.volume) if ul else 0.0
 
 
 def pockets(stack: Layup) -> list[Pocket]:
-    """The pockets of every chamber, bottom to top; equal ones are computed once."""
+    """Return the pockets of every chamber, bottom to top; equal ones are computed once."""
     lifts: dict[tuple[bytes, ...], Lift] = {}
     return [
         _pocket(stack, chamber, ply, lifts)
@@ -143,7 +144,7 @@ def _pocket(stack: Layup, chamber: str, ply: int, lifts: dict[tuple[bytes, ...],
         return lifts[key]
 
     def largest() -> float:
-        """A drawn pocket's volume over its inscribed disc's is the ratio of their even lifts."""
+        """A drawn pocket holds as much as its inscribed disc, times the ratio of their lifts."""
         even = lift_of(cells & False)
         offsets = stack.plane.points[fixed][:, None] - np.array(places)
         half = float(np.linalg.norm(offsets, axis=2).min())
@@ -165,7 +166,7 @@ def _pocket(stack: Layup, chamber: str, ply: int, lifts: dict[tuple[bytes, ...],
 
 
 def _discs(stack: Layup, necks: Flags, fixed: Ints, places: list[Point]) -> Iterator[Ints]:
-    """The nodes of each neck disc, by the nearest axis."""
+    """Return the nodes of each neck disc, by the nearest axis."""
     nodes = np.setdiff1d(stack.nodes(necks), fixed)
     offsets = stack.plane.points[nodes][:, None] - np.array(places)
     nearest = np.linalg.norm(offsets, axis=2).argmin(axis=1)
@@ -173,12 +174,13 @@ def _discs(stack: Layup, necks: Flags, fixed: Ints, places: list[Point]) -> Iter
 
 
 def _largest(interface: Interface, centre: Point) -> float | None:
-    """Most air in ul that a round or oblong balloon round a centre can hold; None for others.
+    """Return the largest air volume in ul of a round or oblong balloon around a centre; None for
+    others.
 
     A round pocket is two paraboloids whose meridian keeps its length (paper Eqs. 1 to 3), an oblong
-    one two arcs (as in ``predict``). A circle on the centre is most of a round one's edge; a slot
-    ends in two of equal radius at equal distances on either side, if at least a third of a turn of
-    each remains beside inlet and manifold.
+    one two arcs (as in ``predict``). Most of a round pocket's edge lies on a circle about the
+    centre; a slot ends in two arcs of equal radius at equal distances on either side, if at least a
+    third of a turn of each remains beside inlet and manifold.
     """
     turns: defaultdict[tuple[Point, float], float] = defaultdict(float)
     for edge in (edge for outer in interface.unbonded.outers for edge in outer.edges):
@@ -204,7 +206,8 @@ FLATNESS = 0.002
 
 
 def filled(stack: Layup, amounts: Mapping[str, float], all_pockets: list[Pocket]) -> Floats:
-    """Heights (plies, plane nodes) in mm of all films over these pockets, as ``flat`` gives them.
+    """Return the heights (plies, plane nodes) in mm of all films over these pockets, as ``flat``
+    does.
 
     ``amounts`` are ul of air in each balloon by chamber. Raises DesignError for more air than a
     film of constant length can hold, and if it lifts the chambers of one body by unequal heights.
@@ -235,6 +238,6 @@ def _check_even(steps: Floats) -> None:
     apart = float(np.ptp(steps))
     if apart > FLATNESS * float(np.abs(steps).max()):
         raise DesignError(
-            f"the fill lifts the chambers {apart:.3f} mm apart, for their pockets are unlike; "
-            "leave out the fill"
+            f"the fill lifts the chambers by heights that differ by {apart:.3f} mm, because "
+            "their pockets differ; omit the fill"
         )

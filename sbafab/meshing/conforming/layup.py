@@ -1,4 +1,4 @@
-"""Layup that volume and shell mesh share: settings, symmetry, films, voids, film positions."""
+"""Layup shared by volume and shell mesh: settings, symmetry, films, voids, film positions."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class MeshSettings:
 
     ``h`` is the side of the triangles in mm. ``symmetry``: half of the actuator, the quarter of a
     1-DoF one away from its inlet, or one lobe's sector. ``fill_ul`` is the air in every balloon in
-    ul; None is the flat shape. ``gaps`` keeps the films a mask's
-    thickness apart, with bonds of that thickness; without it films lie on each other, and the
-    height is the sum of the TPE films. ``wrapped``: a laminate made for a tube is wrapped round it,
-    with the tube's axis along z; otherwise it lies flat.
+    ul; None is the flat shape. ``gaps`` keeps the films a mask's thickness apart, with bonds of
+    that thickness; without it films touch, and the height is the sum of the TPE films. ``wrapped``:
+    a laminate made for a tube is wrapped around it, with the tube's axis along z; otherwise it is
+    flat.
     """
 
     h: float = 0.35
@@ -53,7 +53,7 @@ NEAR = 0.1
 
 
 class Sector(NamedTuple):
-    """Meshed part of the plane, and its symmetry planes by name: directions from the axis."""
+    """The meshed part of the plane, and its symmetry planes by name: directions from the axis."""
 
     region: Region
     planes: tuple[tuple[str, Point], ...]
@@ -68,12 +68,11 @@ class Sector(NamedTuple):
 
 
 def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
-    """The part of the laminate to mesh, None for all of it.
+    """Return the part of the laminate to mesh, None for all of it.
 
-    Half: one side of the plane y = 0, or else of x = 0. Quarter: for a stack on the axis, the
-    quarter at x < 0, y > 0, which excludes the inlet. Sector: one of several stacks round the axis,
-    with its inlet.
-    Raises DesignError if the laminate is not symmetric.
+    Half: one side of the plane y = 0, else of x = 0. Quarter: for a stack on the axis, the quarter
+    at x < 0, y > 0, which excludes the inlet. Sector: one of several stacks around the axis, with
+    its inlet. Raises DesignError if the laminate is not symmetric.
     """
     if symmetry == "full":
         return None
@@ -99,8 +98,8 @@ def sector(laminate: Laminate, symmetry: Symmetry) -> Sector | None:
         ends = ("symmetry_sector_1", rays[0]), ("symmetry_sector_2", rays[-1])
         return Sector(lobe, ends)
     raise DesignError(
-        f"mesh symmetry {symmetry} is not this laminate's: a profile differs from its image; "
-        "use full, or leave out parts on one side only, such as ears and inlet tabs"
+        f"this laminate lacks the mesh symmetry {symmetry}: a profile differs from its image; "
+        "use full, or omit parts on one side only, such as ears and inlet tabs"
     )
 
 
@@ -123,7 +122,7 @@ def _is_quarter(laminate: Laminate, region: Region, far: float) -> bool:
 
 
 def meshed_shares(laminate: Laminate, part: Sector | None) -> dict[str, float]:
-    """The fraction of each chamber that is in the part."""
+    """Return the fraction of each chamber in the meshed part."""
     shares = {}
     for chamber in laminate.chambers:
         discs = [disc(centre, NEAR) for centre in chamber.centres]
@@ -133,7 +132,7 @@ def meshed_shares(laminate: Laminate, part: Sector | None) -> dict[str, float]:
 
 
 def images(laminate: Laminate, symmetry: Symmetry) -> dict[str, str]:
-    """For each chamber, the one meshed in its place: itself, or one that it is an image of."""
+    """For each chamber, the chamber meshed in its place: itself, or one that it is an image of."""
     part = sector(laminate, symmetry)
     places = {chamber.name: chamber.centres[0] for chamber in laminate.chambers}
     meshed = [name for name, share in meshed_shares(laminate, part).items() if share]
@@ -159,8 +158,8 @@ KINDS = ("separator", "chamber")
 
 
 class Ply(NamedTuple):
-    """One TPE film. ``cells`` are the triangles it covers, ``bonded`` the triangles bonded to the
-    ply below, ``gap`` mm above it; ``area`` is its exact area in mm2.
+    """One TPE film. ``cells`` are its triangles, ``bonded`` those bonded to the ply below, ``gap``
+    mm above it; ``area`` is its exact area in mm2.
     """
 
     layer: Layer
@@ -195,7 +194,7 @@ class MeshedVoid(NamedTuple):
 class Layup:
     """Data shared by the meshes of one laminate. ``seats`` are the triangles on the channels' axes
     that hold base and tip: the neck ring with the bore inside it. ``shares`` are the meshed
-    fractions of the chambers. Without ``is_thick`` films are their mid-surfaces.
+    fractions of the chambers. Without ``is_thick`` films are represented by their mid-surfaces.
     """
 
     laminate: Laminate
@@ -209,26 +208,26 @@ class Layup:
     is_thick: bool = True
 
     def nodes(self, cells: Flags) -> Ints:
-        """The plane's nodes of some triangles."""
+        """Return the plane's nodes of some triangles."""
         return np.unique(self.plane.triangles[cells])
 
     @property
     def stacks(self) -> list[tuple[str, Point]]:
-        """Chamber and axis of each stack that is meshed, chamber by chamber."""
+        """The chamber and axis of each meshed stack, chamber by chamber."""
         chambers = [chamber for chamber in self.laminate.chambers if chamber.name in self.voids]
         return [(chamber.name, centre) for chamber in chambers for centre in chamber.centres]
 
     @property
     def centres(self) -> tuple[Point, ...]:
-        """The axes of all stacks that are meshed."""
+        """The axes of all meshed stacks."""
         return tuple(centre for _, centre in self.stacks)
 
 
 def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
-    """The films and voids of a laminate over one triangulation.
+    """Return the films and voids of a laminate over one triangulation.
 
-    Raises DesignError if h does not suit the laminate or the design lacks the symmetry,
-    OutputError if bonds touch in one point.
+    Raises DesignError if h does not suit the laminate or the design lacks the symmetry, OutputError
+    if bonds touch in one point.
     """
     laminate = parted(laminate)
     _check_size(laminate, settings)
@@ -277,28 +276,29 @@ def layup(laminate: Laminate, settings: MeshSettings) -> Layup:
 
 
 def _check_size(laminate: Laminate, settings: MeshSettings) -> None:
-    """Raises DesignError if h is larger than the narrowest ring, or far too small."""
+    """Raise DesignError if h is larger than the narrowest ring, or far too small."""
     h = settings.h
     width, place = narrowest_ring(laminate) or (h, "")
     if not h > 0:
-        raise DesignError(f"h = {h:g} mm is not a size for a mesh; ask for 0.35 mm")
+        raise DesignError(f"h = {h:g} mm is not a valid mesh size; use 0.35 mm")
     if h > width * (1 + 1e-6):
         raise DesignError(
-            f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; "
-            f"ask for {width:.3f} mm at most"
+            f"h = {h:g} mm is larger than {place}, which is {width:.3f} mm wide; use at most "
+            f"{width:.3f} mm"
         )
     covered = sum(layer.profile.area for layer in laminate.tpe_layers)
     elements = 2.31 * covered / h**2 * (3 if settings.element == "tet" else 1)
     if elements > MOST_ELEMENTS:
         least = h * (elements / MOST_ELEMENTS) ** 0.5
         raise DesignError(
-            f"h = {h:g} mm makes about {elements:.2g} elements of this laminate, more than "
-            f"{MOST_ELEMENTS:,}; ask for {least:.2f} mm or more"
+            f"h = {h:g} mm gives about {elements:.2g} elements for this laminate, more than "
+            f"{MOST_ELEMENTS:,}; use at least {least:.2f} mm"
         )
 
 
 def narrowest_ring(laminate: Laminate) -> tuple[float, str] | None:
-    """Width in mm of the narrowest bonded ring, which is the largest possible h, and its name.
+    """Return the width in mm of the narrowest bonded ring, which is the largest possible h, and its
+    name.
 
     A lone balloon's ring is open at its inlet, whose strip runs to the edge of the films: there it
     is the bond beside the pocket.
@@ -324,7 +324,7 @@ def _margins(outer: Bounds, inner: Bounds) -> Bounds:
 
 
 def _bond(laminate: Laminate, interface: Interface) -> Region:
-    """Return the bond without snipped-off ears: only the neck rings between balloons."""
+    """Return the bond without ears that are cut off: only the neck rings between balloons."""
     if interface.kind != "separator":
         return body_bond(interface)
     centres = [centre for chamber in laminate.chambers for centre in chamber.centres]
@@ -339,7 +339,7 @@ def _bond(laminate: Laminate, interface: Interface) -> Region:
 
 
 def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
-    """The discs on which base and tip stand, one per stack."""
+    """Return the discs on which base and tip stand, one per stack."""
     bonds = {kind: [i.bond for i in laminate.interfaces if i.kind == kind] for kind in KINDS}
     for centre in chamber.centres:
         necks = [n for bond in bonds["separator"] for n in bond.outers if n.winding(centre)]
@@ -351,7 +351,7 @@ def _seats(laminate: Laminate, chamber: Chamber) -> Iterator[Region]:
 
 
 def _check_apart(plane: Plane, ply: Ply) -> None:
-    """Raises OutputError if two parts of a bond meet in a single point."""
+    """Raise OutputError if two parts of a bond meet in a single point."""
     triangles = plane.triangles[ply.bonded]
     middles, times = np.unique(triangles[:, 3:], return_counts=True)
     edge = np.isin(triangles[:, 3:], middles[times == 1])
@@ -362,7 +362,7 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
         x, y = plane.points[touching[0]]
         raise OutputError(
             f"Bonds under layer {ply.layer.index} touch in one point at x {x:.3f}, y {y:.3f}; "
-            "change a size there by 0.01 mm or more."
+            "change a dimension there by at least 0.01 mm."
         )
 
 
@@ -371,8 +371,8 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
 
 class FormedFilm(NamedTuple):
     """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
-    (n, 3) along which its thickness is measured. ``growth`` is the relative increase of its volume
-    over the flat film's, if it is bent round a tube.
+    (n, 3) of its thickness. ``growth`` is the relative increase of its volume over the flat film's,
+    if it is bent around a tube.
     """
 
     base: Floats
@@ -380,13 +380,13 @@ class FormedFilm(NamedTuple):
     growth: float = 0.0
 
     def at(self, height: float) -> Floats:
-        """Points (n, 3) of the film ``height`` mm above its lower face."""
+        """Return points (n, 3) of the film ``height`` mm above its lower face."""
         points: Floats = self.base + height * self.up
         return points
 
 
 def flat(stack: Layup) -> Floats:
-    """Heights (plies, plane nodes) in mm of the lower faces of all films, flat."""
+    """Return the heights (plies, plane nodes) in mm of the lower faces of all films, flat."""
     levels = np.array([ply.z for ply in stack.plies])
     return np.repeat(levels[:, None], len(stack.plane.points), axis=1)
 
@@ -396,7 +396,7 @@ TOUCHING = 0.002
 
 
 def check_apart(stack: Layup, heights: Floats) -> None:
-    """Raises OutputError if films at these heights pass through each other."""
+    """Raise OutputError if films at these heights intersect."""
     top = np.full(heights.shape[1], -math.inf)
     for ply, height in zip(stack.plies, heights, strict=True):
         nodes = stack.nodes(ply.cells)
@@ -405,7 +405,7 @@ def check_apart(stack: Layup, heights: Floats) -> None:
             x, y = stack.plane.points[nodes[depth.argmax()]]
             raise OutputError(
                 f"film {ply.layer.index} would pass through one below it by {depth.max():.2f} mm "
-                f"at x {x:.3f}, y {y:.3f}; ask for less fill"
+                f"at x {x:.3f}, y {y:.3f}; reduce the fill"
             )
         top[nodes] = height[nodes] + (ply.thickness if stack.is_thick else 0.0)
 
@@ -443,9 +443,9 @@ LAID = 12
 
 
 def formed(stack: Layup, heights: Floats | None = None) -> list[FormedFilm]:
-    """The films at these heights, by default flat, wrapped if the laminate is on a tube.
+    """Return the films at these heights, by default flat, wrapped if the laminate is on a tube.
 
-    Raises OutputError if films cross, DesignError if filled balloons meet round the tube.
+    Raises OutputError if films cross, DesignError if filled balloons meet around the tube.
     """
     heights = flat(stack) if heights is None else heights
     check_apart(stack, heights)
@@ -459,7 +459,7 @@ def formed(stack: Layup, heights: Floats | None = None) -> list[FormedFilm]:
 def _round_tube(stack: Layup, wrap: TubeWrap, heights: Floats) -> Iterator[FormedFilm]:
     """Yield the films in their wrapped positions. Raises DesignError if balloons meet.
 
-    A film that is bent less than the tube stays outside of its sheet.
+    A film with a smaller curvature than the tube stays outside its sheet.
     """
     x = stack.plane.points[:, 0]
     of_node, of_centre = bodies(stack)
@@ -499,7 +499,7 @@ def _wrapped(
     share: Floats,
     laid: Floats,
 ) -> FormedFilm:
-    """A film at heights z wrapped, and drawn down to the tube by the share ``laid``."""
+    """Return a film at heights z, wrapped and drawn down to the tube by the fraction ``laid``."""
     flat_base = np.column_stack([stack.plane.points, z])
     x = flat_base[:, 0]
     base, lean = wrap.placed(flat_base, middle, share), wrap.lean(x, middle, share)
@@ -516,7 +516,7 @@ def _wrapped(
 
 
 def _check_room(wrap: TubeWrap, ply: Ply, points: Floats, around: Floats, bodies: int) -> None:
-    """Raises DesignError if a film reaches past the middle between two bodies, which are fixed at
+    """Raise DesignError if a film extends past the middle between two bodies, which are fixed at
     angles ``around`` the tube.
     """
     x, y, _ = points.T
@@ -524,7 +524,7 @@ def _check_room(wrap: TubeWrap, ply: Ply, points: Floats, around: Floats, bodies
     aside = float(np.abs(np.angle(np.exp(1j * (np.arctan2(y, x) - around)))).max())
     if (aside - room) * wrap.radius > OVERLAP:
         raise DesignError(
-            f"filled balloons meet round the tube of {2 * wrap.radius:g} mm: film "
-            f"{ply.layer.index} reaches {math.degrees(aside):.1f} degrees round it "
-            f"where each has {math.degrees(room):.1f}; ask for less fill"
+            f"filled balloons meet around the tube of {2 * wrap.radius:g} mm: film "
+            f"{ply.layer.index} extends {math.degrees(aside):.1f} degrees, but has "
+            f"{math.degrees(room):.1f}; reduce the fill"
         )

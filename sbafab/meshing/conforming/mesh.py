@@ -79,7 +79,7 @@ _POWERS: dict[ElementKind, tuple[tuple[int, ...], ...]] = {
 
 @cache
 def _shapes(kind: ElementKind, integration: bool) -> tuple[Floats, Floats]:
-    """Shape functions (places, nodes) and their derivatives (places, nodes, dimensions).
+    """Return shape functions (places, nodes) and their derivatives (places, nodes, dimensions).
 
     Places are the element's nodes, or its integration points.
     """
@@ -98,7 +98,7 @@ def _shapes(kind: ElementKind, integration: bool) -> tuple[Floats, Floats]:
 
 
 def jacobians(kind: ElementKind, points: Floats, cells: Ints, integration: bool = False) -> Floats:
-    """Matrices (cells, places, space, dimensions) of the map from the reference element.
+    """Return matrices (cells, places, space, dimensions) of the map from the reference element.
 
     Places are the element's nodes, or its integration points.
     """
@@ -109,10 +109,10 @@ def jacobians(kind: ElementKind, points: Floats, cells: Ints, integration: bool 
 
 
 def scaled_jacobians(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
-    """Least scaled Jacobian of each cell at its nodes and integration points.
+    """Return the least scaled Jacobian of each cell at its nodes and integration points.
 
-    Determinant over the product of the lengths of its columns: 1 for edges at right angles, 0.87
-    in an equilateral triangle, negative if the element is inverted.
+    It is the determinant over the product of the lengths of its columns: 1 for edges at right
+    angles, 0.87 in an equilateral triangle, negative if the element is inverted.
     """
     least = np.full(len(cells), np.inf)
     for integration in (False, True):
@@ -124,14 +124,14 @@ def scaled_jacobians(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
 
 
 def volumes(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
-    """Volume of each cell in mm3, or area in mm2 of triangles."""
+    """Return the volume of each cell in mm3, or the area in mm2 of triangles."""
     determinants = _determinant(jacobians(kind, points, cells, integration=True))
     sizes: Floats = np.sum(determinants, axis=1) * _GAUSS[kind][0]
     return sizes
 
 
 def aspects(kind: ElementKind, points: Floats, cells: Ints) -> Floats:
-    """Longest edge over shortest of each cell, between its corners."""
+    """Return the longest edge over the shortest of each cell, between its corners."""
     lengths = np.stack(
         [np.linalg.norm(points[cells[:, a]] - points[cells[:, b]], axis=1) for a, b in EDGES[kind]]
     )
@@ -182,10 +182,10 @@ SIDE = (-1, 3, 5, 4)
 
 
 def tetrahedra(prisms: Ints, corners: Ints) -> Ints:
-    """Three tetrahedra (3 x m, 10) of second order for each prism, in its order.
+    """Return three tetrahedra (3 x m, 10) of second order for each prism, in its order.
 
     ``corners`` (m, 3) are the plane's nodes under each prism: the diagonal of a side starts at its
-    lower corner with the smaller number, so that neighbours agree.
+    lower corner with the smaller number, so that neighbours match.
     """
     side = np.array(SIDE)
     ranked = np.argsort(corners, axis=1)
@@ -222,13 +222,12 @@ class Mesh:
     """Elements of one kind, and named parts of them.
 
     ``points`` (n, 3) mm; ``cells`` (m, nodes) indices of points. ``node_sets`` and ``cell_sets``
-    hold sorted indices; ``face_sets`` rows of cell and face number, as in ``FACES``.
-    ``cavities`` are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter-
-    clockwise seen from outside of the air; inlets are closed by a patch. ``thickness`` is a
-    shell's, in mm, one value per cell set. ``notes`` are sentences for the reader of a mesh file.
-    ``materials`` names the film of each part of a volume mesh; a bond takes the film that melts.
-    ``rest`` (n, 3) are the points in the flat, stress-free laminate; None if the mesh itself is
-    flat.
+    hold sorted indices; ``face_sets`` rows of cell and face number, as in ``FACES``. ``cavities``
+    are closed surfaces (k, 3) of flat triangles in this mesh's nodes, counter- clockwise seen from
+    outside of the air; inlets are closed by a patch. ``thickness`` is a shell's, in mm, one value
+    per cell set. ``notes`` are sentences for the reader of a mesh file. ``materials`` names the
+    film of each part of a volume mesh; for a bond it is the film that melts. ``rest`` (n, 3) are
+    the points in the flat, stress-free laminate; None if the mesh itself is flat.
     """
 
     name: str
@@ -264,12 +263,12 @@ class Mesh:
         return np.concatenate(triangles)
 
     def surface(self, triangles: Ints) -> tuple[Surface, Ints]:
-        """Triangles of nodes as a separate surface, and the node of each of its points."""
+        """Return triangles of nodes as a separate surface, and the node of each of its points."""
         nodes, faces = np.unique(triangles, return_inverse=True)
         return Surface(self.points[nodes], faces.reshape(-1, 3)), nodes
 
     def cavity(self, name: str) -> tuple[Surface, Ints]:
-        """A cavity as a separate surface, and the mesh node of each of its points."""
+        """Return a cavity as a separate surface, and the mesh node of each of its points."""
         return self.surface(self.cavities[name])
 
     def node_fields(self) -> dict[str, NDArray[np.uint8]]:
@@ -281,7 +280,7 @@ class Mesh:
         }
 
     def cell_fields(self) -> dict[str, NDArray[np.int32] | NDArray[np.uint8]]:
-        """Return ``part``, each cell's part from 1, and the face sets as 0 or 1 per cell."""
+        """``part``, the number of each cell's part from 1, and the face sets as 0 or 1 per cell."""
         part = np.zeros(len(self.cells), dtype=np.int32)
         for number, cells in enumerate(self.parts.values(), start=1):
             part[cells] = number
@@ -291,7 +290,8 @@ class Mesh:
         return {"part": part, **faces}
 
     def linear(self) -> tuple[Floats, Ints, Ints]:
-        """Points, and tetrahedra or triangles of first order through the corners; the cell of each.
+        """Return points, first-order tetrahedra or triangles through the corners, and the cell of
+        each.
 
         Wedges become three tetrahedra each.
         """

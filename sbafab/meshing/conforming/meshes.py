@@ -1,4 +1,4 @@
-"""Volume and shell mesh: the triangulation swept through every film, with named sets; and files.
+"""Volume and shell mesh: the triangulation extruded through every film, with named sets; and files.
 
 Bonded faces share their nodes. Each mesh is checked: elements, skin, volumes and cavities.
 """
@@ -50,8 +50,8 @@ Sets = dict[str, Ints]
 class Sweep:
     """Nodes and cells of the films of a layup, bottom to top.
 
-    Films that lie on each other share the nodes of a bond, its edge included; if gaps are kept,
-    prisms join them. Films of a thin layup are triangles; bonded ones share one.
+    Films that touch share the nodes of a bond, including its edge; if gaps are kept, prisms join
+    them. Films of a thin layup are triangles; bonded films share one.
 
     ``forms`` are the films at ``heights`` over the plane, by default flat. ``lower``, ``middle``
     and ``upper`` (plies, plane nodes) number the nodes of each film over the plane's, -1 if absent;
@@ -73,7 +73,7 @@ class Sweep:
 
     @cached_property
     def beyond(self) -> Ints:
-        """The triangle (m, 3) beyond each side of each triangle, -1 without a neighbour."""
+        """The triangle (m, 3) beyond each side of each triangle, -1 if there is none."""
         middles = self.stack.plane.triangles[:, 3:].ravel()
         order = np.argsort(middles, kind="stable")
         twins = np.flatnonzero(np.diff(middles[order]) == 0)
@@ -89,7 +89,7 @@ class Sweep:
 
     @property
     def cells(self) -> Ints:
-        """Prisms (m, 18): six nodes of a triangle below, halfway up and above; or triangles."""
+        """Prisms (m, 18): the six nodes of a triangle below, halfway up and above; or triangles."""
         return np.concatenate(self._cells)
 
     def _add(self, k: int, form: FormedFilm, below: FormedFilm) -> None:
@@ -113,7 +113,7 @@ class Sweep:
         self._fill(self.cell_of[k], ply.cells, lower, middle, upper)
 
     def _half_up(self, nodes: Ints) -> Ints:
-        """Those with a node halfway up: mid-edge nodes have one for tetrahedra only."""
+        """Return those with a node halfway up: mid-edge nodes have one for tetrahedra only."""
         is_tet = self.stack.settings.element == "tet"
         return nodes if is_tet else nodes[nodes < self.stack.plane.corners]
 
@@ -140,20 +140,20 @@ BOTTOM, TOP, SIDES = 0, 1, 2
 
 
 def _bordering(swept: Sweep, inside: Flags, beside: Flags) -> tuple[Ints, Ints]:
-    """Triangles of ``inside`` and their sides that lie against a triangle of ``beside``."""
+    """Return triangles of ``inside`` and their sides that adjoin a triangle of ``beside``."""
     # The last entry, False, stands for the outside of the plane.
     cells, sides = np.nonzero(inside[:, None] & np.append(beside, False)[swept.beyond])
     return cells, sides
 
 
 def _edges(swept: Sweep, triangles: Ints, sides: Ints) -> Ints:
-    """Nodes (k, 3) of the plane on sides of triangles: start, end, middle."""
+    """Return nodes (k, 3) of the plane on sides of triangles: start, end, middle."""
     places = np.column_stack([sides, (sides + 1) % 3, 3 + sides])
     return np.take_along_axis(swept.stack.plane.triangles[triangles], places, axis=1)
 
 
 def wetted(swept: Sweep, void: MeshedVoid) -> Ints:
-    """Cells and their faces (k, 2) that the air of a void touches."""
+    """Return cells and their faces (k, 2) in contact with the air of a void."""
     parts: list[tuple[Ints, Ints | int]] = []
     plies = swept.stack.plies
     for k, cells in sorted(void.under.items()):
@@ -169,7 +169,7 @@ def wetted(swept: Sweep, void: MeshedVoid) -> Ints:
 
 
 def mouths(swept: Sweep, void: MeshedVoid) -> list[Ints]:
-    """Triangles (k, 3) of mesh nodes over each place where a void ends without a bond."""
+    """Return triangles (k, 3) of mesh nodes over each place where a void ends without a bond."""
     stack, patches = swept.stack, []
     for k, cells in sorted(void.under.items()):
         closed = np.append(cells | stack.plies[k].bonded, False)
@@ -183,7 +183,7 @@ def mouths(swept: Sweep, void: MeshedVoid) -> list[Ints]:
 
 
 def _mouth_patch(swept: Sweep, ply: int, edges: Ints) -> Ints:
-    """Triangles (k, 3) between the two films at a void's mouth, out of the void."""
+    """Return triangles (k, 3) between the two films at a void's mouth, facing outward."""
     low, high, half = swept.upper[ply - 1], swept.lower[ply], swept.joints[ply]
     for k, level in ((ply - 1, low), (ply, high)):
         _check_covered(swept, k, level, edges.ravel())
@@ -196,7 +196,7 @@ def _mouth_patch(swept: Sweep, ply: int, edges: Ints) -> Ints:
 
 
 def lids(swept: Sweep, void: MeshedVoid) -> list[Ints]:
-    """Return triangles (k, 3) of mesh nodes over holes by which a void leaves it through a film.
+    """Return triangles (k, 3) of mesh nodes over film holes through which a void continues.
 
     Such a hole leads to another chamber of its net, or to a tube; its rim is the lid's.
     """
@@ -214,17 +214,17 @@ def lids(swept: Sweep, void: MeshedVoid) -> list[Ints]:
 
 
 def _check_covered(swept: Sweep, ply: int, level: Ints, nodes: Ints) -> None:
-    """Raises OutputError if a film ends at nodes of the plane round the opening of a pocket."""
+    """Raise OutputError if a film ends at nodes of the plane around the opening of a pocket."""
     if level[nodes].min() < 0:
         x, y = swept.stack.plane.points[nodes[int(level[nodes].argmin())]]
         raise OutputError(
             f"Layer {swept.stack.plies[ply].layer.index} ends at x {x:.3f}, y {y:.3f}, beside an "
-            "open pocket; let the film go on round its hole, and both films end at a mouth."
+            "open pocket; continue the film around its hole, and end both films at a mouth."
         )
 
 
 def _with_air(mesh: Mesh, swept: Sweep, faces_of: Callable[[Ints], Ints]) -> Mesh:
-    """The mesh with its sets and cavities; ``faces_of`` turns faces of prisms into its own."""
+    """The mesh with its sets and cavities; ``faces_of`` converts faces of prisms into its own."""
     named, face_sets, cavities = node_sets(swept), {}, {}
     for name, void in swept.stack.voids.items():
         faces = faces_of(wetted(swept, void))
@@ -258,7 +258,7 @@ def faces_of_tetrahedra(prisms: Ints, tetrahedra: Ints, faces: Ints) -> Ints:
 
 
 def skin(mesh: Mesh) -> Ints:
-    """The faces (k, 2: cell and face number) that belong to one cell only."""
+    """Return the faces (k, 2: cell and face number) that belong to one cell only."""
     size, count = len(mesh.points), len(mesh.cells)
     keys = []
     for local in FACES[mesh.kind]:
@@ -276,12 +276,12 @@ def skin(mesh: Mesh) -> Ints:
 
 
 def bond_name(ply: int) -> str:
-    """The bond under a film, by its interface's index counted from 1."""
+    """Return the name of the bond under a film, by its interface's index from 1."""
     return f"bond_{ply:03d}"
 
 
 def node_sets(swept: Sweep) -> Sets:
-    """Bonds, base, tip and symmetry planes."""
+    """Return the node sets of bonds, base, tip and symmetry planes."""
     sets, stack = {}, swept.stack
     for k, ply in enumerate(stack.plies):
         if ply.bonded.any():
@@ -306,7 +306,7 @@ VOLUME_TOLERANCE = 0.001
 
 
 def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
-    """Raises OutputError if an element is inverted, skin or cavities are open, or a volume is off.
+    """Raise OutputError if an element is inverted, skin or cavities are open, or a volume deviates.
 
     ``expected`` gives the exact volume in mm3 of cell sets.
     """
@@ -316,7 +316,7 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
         x, y, z = mesh.points[mesh.cells[worst]].mean(axis=0)
         raise OutputError(
             f"{int((least <= 0).sum())} elements of the {mesh.name} mesh are inverted, the worst "
-            f"at x {x:.3f}, y {y:.3f}, z {z:.3f}; ask for a smaller h or less fill."
+            f"at x {x:.3f}, y {y:.3f}, z {z:.3f}; use a smaller h or less fill."
         )
     # Flat triangles through all nodes tell two sides between the same corners apart.
     if mesh.kind != "triangle6" and len(unpaired_edges(mesh.flat_triangles(skin(mesh)))):
@@ -329,8 +329,8 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
         meshed = float(sizes[mesh.cell_sets[name]].sum())
         if not abs(meshed - volume) <= VOLUME_TOLERANCE * volume:
             raise OutputError(
-                f"The {mesh.name} mesh of {name} holds {meshed:.5f} mm3 where area x thickness "
-                f"is {volume:.5f} mm3; ask for a smaller h."
+                f"The {mesh.name} mesh of {name} holds {meshed:.5f} mm3, but area x thickness is "
+                f"{volume:.5f} mm3; use a smaller h."
             )
     for name, triangles in mesh.cavities.items():
         if gaps := len(unpaired_edges(triangles)):
@@ -344,13 +344,14 @@ def check_mesh(mesh: Mesh, expected: Mapping[str, float]) -> None:
 
 
 def thin(stack: Layup) -> Layup:
-    """The layup with films of zero thickness: all mid-surfaces lie at z = 0."""
+    """Return the layup with films of zero thickness: all mid-surfaces lie at z = 0."""
     plies = tuple(ply._replace(z=0.0, gap=0.0) for ply in stack.plies)
     return replace(stack, plies=plies, is_thick=False)
 
 
 def shell_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
-    """The mid-surfaces of a thin layup at ``heights``, by default flat, with sets and cavities.
+    """Return the mid-surfaces of a thin layup at ``heights``, by default flat, with sets and
+    cavities.
 
     Bonded films share one triangle, which carries the sum of their thicknesses. Cavities exclude
     the neck rings, which have the same air on both sides. Raises OutputError if a check fails.
@@ -371,7 +372,7 @@ def shell_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
 
 
 def _one_sided(faces: Ints) -> Ints:
-    """The faces of cells that the air touches on one side only."""
+    """Return the faces of cells with air on one side only."""
     _, first, times = np.unique(faces[:, 0], return_index=True, return_counts=True)
     one_sided: Ints = faces[np.sort(first[times == 1])]
     return one_sided
@@ -381,7 +382,7 @@ def _one_sided(faces: Ints) -> Ints:
 
 
 def volume_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
-    """The volume mesh of films at ``heights``, by default flat, with its sets and cavities.
+    """Return the volume mesh of films at ``heights``, by default flat, with its sets and cavities.
 
     Raises OutputError if a check fails.
     """
@@ -419,7 +420,7 @@ def volume_mesh(stack: Layup, heights: Floats | None = None) -> Mesh:
 
 
 def _corners_under(swept: Sweep) -> Ints:
-    """The plane's corner nodes (prisms, 3) under each prism."""
+    """Return the plane's corner nodes (prisms, 3) under each prism."""
     under = np.empty((len(swept.cells), 3), dtype=np.int64)
     for numbers in (*swept.cell_of, *swept.joint_of):
         under[numbers[numbers >= 0]] = swept.stack.plane.triangles[numbers >= 0, :3]
@@ -472,16 +473,16 @@ class ConformingMeshes:
 
 
 def conforming_meshes(laminate: Laminate, settings: MeshSettings | None = None) -> ConformingMeshes:
-    """Volume and shell mesh of a laminate, checked.
+    """Return the checked volume and shell mesh of a laminate.
 
-    No element is inverted, skins are manifold, cavities closed, and films hold area x thickness.
-    Raises DesignError if the settings do not suit the laminate or Netgen is not installed,
-    OutputError if a check fails.
+    No element is inverted, skins are manifold, cavities are closed, and films have the volume area
+    x thickness. Raises DesignError if the settings do not suit the laminate or Netgen is not
+    installed, OutputError if a check fails.
     """
     if not laminate.chambers:
         raise DesignError(
-            f"{laminate.name} has no chamber, and these meshes hold the faces of chambers; the "
-            "solid in mesh/ of sbafab generate needs none"
+            f"{laminate.name} has no chamber, which these meshes need; the solid in mesh/ of "
+            "sbafab generate does not"
         )
     settings = settings or MeshSettings()
     stack = layup(laminate, settings)
@@ -545,7 +546,7 @@ def write_conforming(
     """Write ``mesh/volume.*``, ``mesh/shell.*``, and for open pockets ``mesh/skin.*`` and
     ``mesh/cavity_<chamber>_conforming.*``.
 
-    ``folder`` is the output folder, ``formats`` the requested file endings, by default all.
+    ``folder`` is the output folder, ``formats`` the requested file suffixes, by default all.
     Symmetry models have no closed cavities: their cavity walls are face sets of the meshes.
     ``progress`` is called with the number of files done and the total.
     """
@@ -560,7 +561,7 @@ def write_conforming(
 
 
 def _jobs(meshes: ConformingMeshes) -> Iterator[tuple[MeshFile, Callable[[Path], None]]]:
-    """Every possible file, with the function that writes it to a path."""
+    """Yield every possible file, with the function that writes it to a path."""
     fill = meshes.settings.fill_ul or 0.0
 
     def file(stem: str, row: MeshFormat, volume: float, count: int, **facts: Any) -> MeshFile:
@@ -614,10 +615,10 @@ def thinning(shell: Mesh) -> tuple[float, float, float]:
 
 
 def mesh_statistics(mesh: Mesh, thinnest_film_mm: float) -> dict[str, Any]:
-    """Counts, quality and volume of a mesh; a shell's volume is area x thickness.
+    """Return counts, quality and volume of a mesh; a shell's volume is area x thickness.
 
-    Aspect is longest edge over shortest, ``thinnest_film_mm`` the least thickness of a film that
-    air has lifted.
+    Aspect is longest edge over shortest, ``thinnest_film_mm`` the least thickness of a film lifted
+    by air.
     """
     sizes = volumes(mesh.kind, mesh.points, mesh.cells)
     for name, thickness in mesh.thickness.items():

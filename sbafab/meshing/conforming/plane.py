@@ -1,4 +1,4 @@
-"""One triangulation of the plane for all layers: edges of regions, arcs as arcs, and sizes."""
+"""One triangulation of the plane for all layers: edges of regions, exact arcs, and sizes."""
 
 from __future__ import annotations
 
@@ -52,10 +52,10 @@ class Border(NamedTuple):
 
 
 def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
-    """All edges of the regions without duplicates, cut where they meet.
+    """Return all edges of the regions without duplicates, cut at their intersections.
 
-    Two edges that leave a point in one direction (a fillet and the outline it runs into) are
-    joined until they are a small fraction of ``h`` mm apart, so that no cell ends in a cusp.
+    Two edges that leave a point in one direction (a fillet and the outline that it joins) are
+    merged until they are a small fraction of ``h`` mm apart, so that no cell ends in a cusp.
     """
 
     def labelled(plan: Arrangement) -> list[Border]:
@@ -69,7 +69,7 @@ def arrangement(regions: Sequence[Region], h: float) -> list[Border]:
 
 
 def _without_cusps(borders: list[Border], h: float) -> list[Border]:
-    """The borders with every cusp shortened to where its sides are apart."""
+    """Return the borders with every cusp shortened to the point where its sides separate."""
     leaving: defaultdict[Point, list[int]] = defaultdict(list)
     for number, border in enumerate(borders):
         leaving[border.edge.start].append(number)
@@ -89,7 +89,7 @@ def _without_cusps(borders: list[Border], h: float) -> list[Border]:
 
 
 def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Border | None] | None:
-    """The part that two borders from one corner share, and the remainders of both.
+    """Return the part shared by two borders from one corner, and the remainders of both.
 
     The second one is bent over about ``h`` to start where the first one does.
     """
@@ -115,7 +115,7 @@ def _joined(a: Border, b: Border, h: float) -> tuple[Border, Border, Border, Bor
 
 
 def _parting(a: Edge, b: Edge, near: float) -> tuple[Point, Point] | None:
-    """The points, one on each, where two edges with a common start become ``near`` mm apart.
+    """Return the points, one on each, where two edges with a common start become ``near`` mm apart.
 
     None if that happens at the first step, or never.
     """
@@ -143,7 +143,7 @@ LEAST = 0.4
 
 
 def narrows(borders: Sequence[Border], h: float) -> list[float]:
-    """For each edge, the side in mm of the triangles along it: ``h``, or less if needed.
+    """Return for each edge the side in mm of the triangles along it: ``h``, or less if needed.
 
     Along each edge's normals, the next edge that shares no end with it must be at least two
     triangles away; tight arcs have sides of half a radian.
@@ -215,12 +215,12 @@ class Plane(NamedTuple):
     inside: Flags
 
     def areas(self) -> Floats:
-        """Exact area of each curved triangle, mm2."""
+        """The exact area of each curved triangle, mm2."""
         return volumes("triangle6", self.points, self.triangles)
 
 
 def triangulation(regions: Sequence[Region], h: float) -> Plane:
-    """The plane covered by any of the regions, in triangles of about ``h`` mm.
+    """Return the plane covered by any of the regions, in triangles of about ``h`` mm.
 
     Triangles are smaller where edges run closer together. Deterministic. Raises DesignError if
     Netgen is not installed, OutputError if it cannot mesh a cell.
@@ -270,7 +270,7 @@ def _netgen(borders: Sequence[Border], h: float) -> tuple[list[Label], Floats, I
         mesh = geometry.GenerateMesh(MeshingParameters(maxh=h, grading=GRADING))
     except Exception as error:  # Netgen raises its own type, which it does not export.
         raise OutputError(
-            f"The plane could not be meshed at h = {h:g} mm ({error}); ask for another h."
+            f"The plane could not be meshed at h = {h:g} mm ({error}); use another h."
         ) from None
     # Copy: Netgen frees its array with the mesh.
     points = np.array(mesh.Coordinates(), dtype=np.float64)
@@ -289,7 +289,7 @@ def _netgen(borders: Sequence[Border], h: float) -> tuple[list[Label], Floats, I
 def _crossings_halved(
     points: Floats, triangles: Ints, cells: Ints, sides: Ints
 ) -> tuple[Floats, Ints, Ints]:
-    """Triangles with a node on each edge that crosses a cell from border to border.
+    """Return triangles with a node on each edge that crosses a cell from border to border.
 
     Otherwise two films bonded at both ends of such an edge, but not along it, would share it.
     """
@@ -318,7 +318,7 @@ def _crossings_halved(
 
 
 def _sharp_corners(points: Floats, triangles: Ints, sides: Ints) -> set[tuple[int, int]]:
-    """Edges across from a corner between two borders that is too sharp to halve."""
+    """Return edges opposite a corner between two borders that is too sharp to halve."""
     size = len(points)
     border_edges = np.sort(sides[:, :2])
     keys = border_edges[:, 0] * size + border_edges[:, 1]
@@ -336,7 +336,7 @@ def _sharp_corners(points: Floats, triangles: Ints, sides: Ints) -> set[tuple[in
 
 
 def _tangents_meet(arc: Arc) -> Point:
-    """The middle control point of the rational parabola that is the arc."""
+    """Return the middle control point of the arc as a rational parabola."""
     half = arc.sweep / 2
     (mx, my), (cx, cy) = arc.at(0.5), arc.centre
     return cx + (mx - cx) / math.cos(half), cy + (my - cy) / math.cos(half)
@@ -345,7 +345,7 @@ def _tangents_meet(arc: Arc) -> Point:
 def _second_order(
     points: Floats, corners: Ints, sides: Ints, borders: Sequence[Border]
 ) -> tuple[Ints, Floats]:
-    """Triangles with mid-edge nodes, and the mid-edge points: on the arc where an edge is one."""
+    """Triangles with mid-edge nodes, and the mid-edge points: on the arc for curved edges."""
     count = len(points)
     heads = np.roll(corners, -1, axis=1)
     keys = np.minimum(corners, heads) * count + np.maximum(corners, heads)

@@ -1,1 +1,1 @@
-"""traveller.html: the technician's page at the laser and the press."""
+"""traveller.html: the technician's page for the laser and the press."""

@@ -39,7 +39,7 @@ class AssemblyWork:
     """The input of an assembly's traveller; ``findings`` are from checks between parts.
 
     ``waived`` are checks, ``lowered`` limits below the defaults, for the checks between parts and
-    for all designs; ``picture`` are the bytes of the assembly's picture.
+    for all designs; ``picture`` is the picture of the assembly, as bytes.
     """
 
     assembled: Assembled
@@ -53,14 +53,14 @@ class AssemblyWork:
 
     @property
     def marks(self) -> dict[str, str]:
-        """A letter for each of several designs, so that labels stay short."""
+        """Return a letter for each of several designs, for short labels."""
         names = [work.design.name for work in self.works]
         several = len(names) > 1
         return {name: ascii_uppercase[i % 26] if several else "" for i, name in enumerate(names)}
 
 
 def assembly_html(assembly: AssemblyWork) -> str:
-    """Return the whole page, each pattern prefixed with the mark of its design."""
+    """Return the whole page, with each pattern prefixed by the mark of its design."""
     assembly = _with_marks(assembly)
     assembled, works, marks = assembly.assembled, assembly.works, assembly.marks
     name = assembled.assembly.name
@@ -105,7 +105,7 @@ def _chapter(assembly: AssemblyWork, number: int) -> str:
 
 def _with_marks(assembly: AssemblyWork) -> AssemblyWork:
     """Return the work with "A P03" for P03 of its first design, on sheets and in laminates; a
-    single design's patterns need no mark.
+    single design needs no mark.
     """
     marks = assembly.marks
     if len(marks) == 1:
@@ -133,7 +133,7 @@ POUR = 10.0  # smallest amount of silicone that can be weighed and mixed well, m
 
 
 def _bill(assembly: AssemblyWork) -> list[Item]:
-    """Return the films of all designs together, each design's other items, and bought items."""
+    """Return the films of all designs together, each design's other items, and purchased items."""
     of_designs = [
         Item(f"{item.name} ({work.design.name})", item.what, item.quantity)
         for work in assembly.works
@@ -144,7 +144,7 @@ def _bill(assembly: AssemblyWork) -> list[Item]:
 
 
 def _bought(assembled: Assembled) -> Iterator[Item]:
-    """Yield bought items: parts, for a cup its silicone and mould, and adhesives."""
+    """Yield purchased items: parts, adhesives, and silicone and mould for cups."""
     copies = assembled.assembly.order.copies
     for placed in assembled.parts:
         part = placed.part
@@ -185,7 +185,7 @@ def _size(part: AnyPart) -> str:
 
 
 def adhesive(placed: PlacedPart) -> str | None:
-    """Return the adhesive of a part; for a sheet wrapped around its tube, its design's."""
+    """Return the adhesive of a part; for a sheet wrapped around its tube, that of its design."""
     wrap = None if placed.made is None else placed.made.design.form.wrap
     return placed.part.glue or (wrap.glue if wrap is not None else None)
 
@@ -194,10 +194,10 @@ def adhesive(placed: PlacedPart) -> str | None:
 
 
 class PartJoint:
-    """The joining step of one part: what it is fixed on, and the ``lines`` that are in it before.
+    """The joining step of one part: its host, and the ``lines`` inserted before.
 
-    ``supply`` are the runs of its tubes along the part that it is fixed on. ``is_below``: it is
-    fixed on a lower face, upside down.
+    ``supply`` holds the runs of its tubes along the host. ``is_below``: it is fixed on a lower
+    face, upside down.
     """
 
     def __init__(self, assembled: Assembled, placed: PlacedPart) -> None:
@@ -209,8 +209,8 @@ class PartJoint:
 
     @property
     def heading(self) -> float:
-        """Degrees anti-clockwise from the mark of its carrier to the part's mark, looking at the
-        face that it is fixed on: an actuator bends by its tabs.
+        """The angle in degrees, anti-clockwise, from its host's mark to the part's, facing the
+        joint: an actuator bends by its tabs.
         """
         assert self.carrier is not None
         turn = _mark_angle(self.placed) + self.placed.turn
@@ -220,7 +220,7 @@ class PartJoint:
 
     @property
     def aside(self) -> tuple[float, float]:
-        """Offset of the part's middle to the right and up, mm, looking at the same face."""
+        """The offset of the part's middle to the right and up, mm, facing the joint."""
         x, y = self.part.offset
         return x, (-y if self.is_below else y)
 
@@ -234,13 +234,13 @@ def _mark_angle(placed: PlacedPart) -> float:
 
 
 def joints(assembled: Assembled) -> list[PartJoint]:
-    """Return a step for each part, in the order in which they can be joined."""
+    """Return a step for each part, in a feasible order of joining."""
     return [PartJoint(assembled, placed) for placed in _in_order(assembled)]
 
 
 def _in_order(assembled: Assembled) -> Iterator[PlacedPart]:
-    """Yield parts in building order; a line is inserted while both ends of its lumen are in
-    reach.
+    """Yield parts in building order; a line is inserted while both ends of its lumen are
+    accessible.
     """
     for placed in assembled.parts:
         if placed.made is not None and placed.part.on is not None:
@@ -258,8 +258,8 @@ def _lines_through(assembled: Assembled, placed: PlacedPart) -> list[PlacedPart]
 
 
 def deployed(assembled: Assembled) -> dict[str, Any]:
-    """Return what the finished assembly is tested for: actuators with their leak pressures, and
-    those with a diameter, deflated and inflated.
+    """Return the tests of the finished assembly: actuators with their leak pressures, and those
+    with a diameter, deflated and inflated.
     """
     actuators = [placed for placed in assembled.parts if isinstance(placed, PlacedSba)]
     each = [(sba.name, sizes(sba.made.design, sba.made.laminate)) for sba in actuators]

@@ -1,6 +1,6 @@
-"""bench.html: work and measurements done once per bench; and how films are held and cut.
+"""bench.html: work and measurements done once per bench; fixing and cutting of films.
 
-All of it is ours; the paper gives none.
+This content is not from the paper.
 """
 
 from __future__ import annotations
@@ -30,8 +30,9 @@ from sbafab.rules.pin_fit import most_on_a_pin
 
 
 def held_films(works: Sequence[Work]) -> Iterator[dict[str, Any]]:
-    """Yield every film of sheets whose parts all come free: how it is held, the number of parts and
-    the mass of the ``lightest``, mg, None if its density is unknown. Masks are held like PTFE.
+    """Yield every film of sheets whose parts all come free, with its fixing, the number of parts
+    and the mass of the ``lightest``, mg (None if its density is unknown). Masks are fixed like
+    PTFE.
     """
     for film in films_of(works):
         count, area = 0, math.inf
@@ -60,7 +61,7 @@ def cutting(works: Sequence[Work]) -> dict[str, Any]:
 
     The laser's minutes, metres of cut and travel, and contours are those of all sheets.
     ``tight_pin``: the finding of pin-fit on the design whose films stretch most, the design, and
-    the most films on one pin; None if that rule is silent. ``loose`` and ``spare`` count the pieces
+    the most films on one pin; None without such a finding. ``loose`` and ``spare`` count the pieces
     of masks in several pieces.
     """
     sheets = works[0].sheets
@@ -133,7 +134,7 @@ the list was not opened, so the page asks to compare them with the box."""
 
 
 def pressure_range(works: Sequence[Work]) -> tuple[float, float]:
-    """Return the least and the largest pressure in kPa anywhere on the films."""
+    """Return the lowest and highest pressure in kPa anywhere on the films."""
     steps = [step for work in works for step in work.schedule.steps]
     low = min(min(step.film_kpa, step.bond_kpa, step.plate_kpa) for step in steps)
     return low, max(max(step.edge_kpa, step.film_kpa) for step in steps)
@@ -156,7 +157,7 @@ def punch(diameter: float) -> float:
 def bench_html(
     title: str, sha256: str, works: Sequence[Work], assembled: Assembled | None = None
 ) -> str:
-    """Return the page of work done once per bench, for all designs of a folder."""
+    """Return the page for work done once per bench, for all designs of a folder."""
     pressed = [work for work in works if work.schedule.steps]
     films = films_of(works)
     hands = [w.design.registration for w in works if w.laminate.registration == "channel-pin"]
@@ -180,7 +181,7 @@ def bench_html(
 
 
 def _trials(works: Sequence[Work]) -> dict[str, object]:
-    """Return the films whose bond and adhesive need a trial: all but the paper's and masks."""
+    """Return the films that need a trial of bond and adhesive: all but the paper's and masks."""
     papers = [(PAPER_PRODUCT, PAPER_THICKNESS)]
     bonded = [film for work in works for film in films_without_minutes(work.laminate, papers)]
     glued = [film.product for work in works for film in work.laminate.glued_films]
@@ -192,7 +193,7 @@ def _trials(works: Sequence[Work]) -> dict[str, object]:
 
 
 def _tools(works: Sequence[Work], films: Iterable[Film]) -> dict[str, object]:
-    """Return the facts that decide on the tools, without consumables."""
+    """Return the facts that determine the tools, without consumables."""
     laminates = [work.laminate for work in works]
     steps = [step for work in works for step in work.schedule.steps]
     seams: dict[SeamTool, set[float]] = {}
@@ -238,7 +239,7 @@ def _plate(work: Work) -> dict[str, Any]:
 
 
 def _heat_and_force(works: Sequence[Work]) -> dict[str, Any]:
-    """Return the page's values on time, temperature and force."""
+    """Return the page's values for time, temperature and force."""
     first, heating = works[0].schedule.steps[0], works[0].schedule.heating
     points = {point.point: point for point in first.time_temperature}
     start, melting = points[START], points.get(MELTING)

@@ -23,7 +23,7 @@ YIELD = "registration-yield"
 
 class Hand(NamedTuple):
     """A placement error of up to ``placement`` mm and ``turn`` degrees by hand, and the ``share``
-    of builds that meet every limit at it.
+    of builds that then meet every limit.
     """
 
     placement: float
@@ -34,7 +34,7 @@ class Hand(NamedTuple):
 def findings_html(
     title: str, sha256: str, builds: Sequence[Build], between: Sequence[Finding] = ()
 ) -> str:
-    """Return the whole page: a chapter per design, and one of the checks ``between`` parts."""
+    """Return the whole page: one chapter per design, and one for the checks ``between`` parts."""
     chapters = [_chapter(build) for build in builds]
     if between:
         chapters.append(_sorted("Between the parts", between))
@@ -42,14 +42,14 @@ def findings_html(
 
 
 def _sorted(name: str, findings: Sequence[Finding]) -> dict[str, Any]:
-    """Return a chapter of findings, those that fail or warn first."""
+    """Return a chapter of findings, failures and warnings first."""
     is_open = [f for f in findings if f.verdict in ("fail", "warn") or f.by_user]
     rest = [finding for finding in findings if finding not in is_open]
     return {"name": name, "open": is_open, "rest": rest, "nets": "", "design_hand": None}
 
 
 def _chapter(build: Build) -> dict[str, Any]:
-    """Return the chapter on one design; ``design_hand`` is the placement error that it states."""
+    """Return the chapter on one design; ``design_hand`` is its stated placement error."""
     laminate, design = build.laminate, build.design
     chapter = _sorted(design.name, build.findings)
     if laminate.nets:
@@ -69,8 +69,8 @@ def _chapter(build: Build) -> dict[str, Any]:
 
 
 def other_hands(laminate: Laminate, design: Design) -> tuple[Hand, ...]:
-    """Return the yields at smaller and larger placement errors; empty if the largest loses no
-    build.
+    """Return the yields at smaller and larger placement errors; empty if all builds pass at the
+    largest.
     """
     rougher = [_by_hand(design, factor) for factor in ROUGHER]
     # The margins that the largest error can violate serve smaller errors too.
@@ -86,7 +86,7 @@ def other_hands(laminate: Laminate, design: Design) -> tuple[Hand, ...]:
 
 
 def _by_hand(design: Design, factor: float) -> Design:
-    """Return a design whose hand is ``factor`` times as rough, and whose yield is a slope's."""
+    """Return a design with a placement error ``factor`` times as large, for yield curves."""
     errors = design.registration
     hand = {name: factor * getattr(errors, name) for name in ("hand_placement", "hand_turn")}
     rules = design.rules.model_copy(update={"yield_builds": BUILDS})

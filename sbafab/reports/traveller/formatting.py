@@ -1,4 +1,4 @@
-"""Quantities as text, in the units of the bench's dials and rulers, and the pages that use them."""
+"""Quantities as text, in the units of the bench's instruments, and the pages that use them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def force(newtons: float) -> str:
 
 
 def minutes(value: float | None) -> str:
-    """Return minutes to the tenth below ten, else whole: 3 min, 2.4 min, 47 min; blank for None."""
+    """Minutes to one decimal below ten, else whole: 3 min, 2.4 min, 47 min; blank for None."""
     if value is None:
         return f"{BLANK} min"
     return f"{round(value, 1):g} min" if value < ROUND else f"{value:.0f} min"
@@ -73,7 +73,7 @@ def count(number: int, noun: str, plural: str = "") -> str:
 
 
 def toward(inlet: Inlet) -> str:
-    """Return the bench direction in which an inlet tab points: x to the right, y to the back."""
+    """Return the bench direction of an inlet tab: x to the right, y to the back."""
     u, v = inlet.direction
     return DIRECTIONS[round(math.atan2(v, u) / (math.pi / 4)) % 8]
 
@@ -117,7 +117,7 @@ def _pages() -> Environment:
 
 
 def render(template: str, **values: Any) -> str:
-    """Return a page, or a part of one, from its Jinja template."""
+    """Return a page, or part of one, from its Jinja template."""
     return _pages().get_template(template).render(values)
 
 
@@ -135,5 +135,5 @@ def frame(title: str, sha256: str) -> dict[str, Any]:
 
 
 def _css_string(words: str) -> str:
-    """Return a text as a CSS string that cannot end early or leave the style element."""
+    """Return a text as a CSS string that cannot end early or close the style element."""
     return '"' + "".join(c if c.isalnum() or c in " .-_" else f"\\{ord(c):x} " for c in words) + '"'

@@ -1,4 +1,4 @@
-"""What a step lays: stacks, rounds of layers, and the alignment of what a hand places."""
+"""The contents of a lay-up step: stacks, rounds of layers, and alignment by hand."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ EQUAL = 0.02  # distances that differ by less are the same to a hand, mm
 
 
 class Round:
-    """Layers that are laid repeatedly in one order; ``turns`` holds every turn, ``places`` the
-    layers of all turns at the same place in the round.
+    """Layers laid repeatedly in one order; ``turns`` holds every turn, ``places`` the layers of all
+    turns at the same place in the round.
     """
 
     def __init__(self, turns: Sequence[tuple[Layer, ...]]) -> None:
@@ -33,8 +33,8 @@ class Round:
 
 
 def rounds(layers: Sequence[Layer]) -> tuple[Round, ...]:
-    """Return the layers in order, repetitions grouped; a layer without repetition is a round of
-    one.
+    """Return the layers in order, with repetitions grouped; a layer without repetition is a round
+    of one.
     """
     keys = [(layer.pattern, layer.role) for layer in layers]
     gathered: list[Round] = []
@@ -61,10 +61,8 @@ def _repetition(keys: Sequence[object]) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Bed:
-    """One of the stacks that a step lays on top of each other; ``made_in`` is the step that made
-    it.
-
-    Single layers come off the sheet: ``made_in`` is None.
+    """One of the stacks that a step lays on each other; ``made_in`` is its step, or None for single
+    layers from the sheet.
     """
 
     layers: tuple[int, ...]
@@ -82,7 +80,7 @@ def beds(steps: Sequence[LayUpStep], step: LayUpStep) -> tuple[Bed, ...]:
 
 
 def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
-    """Return the inlets whose tab is part of at least one of the layers."""
+    """Return the inlets with a tab in at least one of the layers."""
     shapes = [layer.profile for layer in distinct_layers(laminate, layers)]
 
     def tab(inlet: Inlet) -> Point:
@@ -101,7 +99,7 @@ def inlets_in(laminate: Laminate, layers: Sequence[int]) -> tuple[Inlet, ...]:
 class PiecePlace:
     """The place of a piece: mm from the lower left corner of its sheet.
 
-    ``x`` and ``y`` are of the balloon's middle, ``left`` and ``low`` of the piece's edges.
+    ``x`` and ``y`` are those of the balloon's middle, ``left`` and ``low`` of the piece's edges.
     """
 
     what: str
@@ -116,8 +114,8 @@ class Alignment(NamedTuple):
     """The edge of a layer and of its neighbour in a step, or of the stack above the layer.
 
     It lies ``outside`` the ``neighbour``, mm; None if each piece has its place in the table.
-    ``layer`` is the one in a stack, 0 for a layer by itself. The edge may also lie ``on`` the edge
-    of a film of the same stack. Neighbours are named, and numbered by ``numbers``.
+    ``layer`` is the one in a stack, 0 for a single layer. The edge may also lie ``on`` the edge of
+    a film of the same stack. Neighbours are named, and numbered by ``numbers``.
     """
 
     layer: int
@@ -131,7 +129,7 @@ class Alignment(NamedTuple):
 
 
 class Things:
-    """The items that a step lays, lowest first: single layers, and each stack of earlier steps."""
+    """The items of a lay-up step, lowest first: single layers, and each stack of earlier steps."""
 
     def __init__(self, laminate: Laminate, lying: Sequence[Bed]) -> None:
         self.laminate = laminate
@@ -140,15 +138,15 @@ class Things:
             self.things += [(i,) for i in bed.layers] if bed.made_in is None else [bed.layers]
 
     def is_lowest(self, index: int) -> bool:
-        """Return True if nothing lies under this layer in the step."""
+        """Return True if the layer is the lowest in the step."""
         return self.things[0][0] == index
 
     def alignment(self, index: int) -> Alignment | None:
-        """Return what the edge of a layer, or of the stack above it, is aligned with; None for
-        nothing.
+        """Return the alignment of the edge of a layer, or of the stack above it; None if there is
+        none.
 
         It is the edge below, or for the lowest layer the one above; a sheet's edges are too far
-        off.
+        away.
         """
         place = next(i for i, thing in enumerate(self.things) if thing[0] == index)
         if len(self.things) < 2:
@@ -169,8 +167,8 @@ class Things:
 
 
 def face_down(layer: Layer, is_turned_over: bool = False) -> str:
-    """Return the face of a layer that is laid down, ", tpu face down", also on work that is turned
-    over; empty for a film with equal faces, laid as it was cut.
+    """Return the face of a layer that is laid down, ", tpu face down", also on turned work; empty
+    for a film with equal faces, laid as cut.
     """
     upper, lower = layer.faces
     if upper != lower:
@@ -179,7 +177,7 @@ def face_down(layer: Layer, is_turned_over: bool = False) -> str:
 
 
 def layer_words(layer: Layer) -> str:
-    """Return material, use, pattern and pieces of a layer, and how it is laid."""
+    """Return material, use, pattern and pieces of a layer, and its orientation."""
     pieces = len(layer.profile.pieces)
     loose = f" in {pieces} pieces" if pieces > 1 else ""
     return f"{film_name(layer)} {layer.pattern}{loose}{face_down(layer)}"
@@ -191,9 +189,9 @@ def film_name(layer: Layer) -> str:
 
 
 def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
-    """Return the lowest separator mask among layers around one axis that reaches out to one side.
+    """Return the lowest separator mask among layers around one axis that extends to one side.
 
-    It reaches out over the inlet tab, under a balloon larger than those between. None without one.
+    It extends over the inlet tab, under a balloon larger than those between. None if there is none.
     """
     if len(laminate.chambers) != 1 or len(laminate.chambers[0].centres) > 1:
         return None
@@ -209,8 +207,8 @@ def over_tab(laminate: Laminate, layers: Sequence[int]) -> Layer | None:
 
 @cached
 def _lip(region: Region, reference: Region) -> tuple[float, bool] | None:
-    """Return the distance in mm by which a region's outline lies outside that of another, below 0
-    inside, and True if it does so without breaks; None if the distance mostly varies.
+    """Return the distance in mm of a region's outline outside another's, negative inside, and True
+    if it is outside everywhere; None if the distance mostly varies.
     """
     outline = Region(reference.outers)
     distances = []
@@ -228,7 +226,7 @@ def _lip(region: Region, reference: Region) -> tuple[float, bool] | None:
 
 
 def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> list[PiecePlace]:
-    """Return the places of everything laid on a sheet by hand; empty for steps without a sheet."""
+    """Return the places of all parts laid on a sheet by hand; empty for steps without a sheet."""
     sheet = laminate.layers[0]
     if step.pins or sheet.role != "sheet" or sheet.index not in step.layers:
         return []
@@ -237,7 +235,7 @@ def places(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed]) -> list[Pi
 
 
 def pitch(piece_places: Sequence[PiecePlace]) -> float | None:
-    """Return the distance from one piece to the next along x; None for a single piece."""
+    """Return the pitch of the pieces along x; None for a single piece."""
     xs = {place.piece: place.x for place in reversed(piece_places)}
     return xs[2] - xs[1] if 2 in xs else None
 

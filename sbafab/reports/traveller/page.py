@@ -1,7 +1,7 @@
-"""traveller.html: one page that goes from the laser to the press and comes back with an actuator.
+"""traveller.html: one page that leads from the laser to the press and to a finished actuator.
 
-Self-contained: style and pictures are inline, nothing is fetched. Same input, same bytes: the
-browser writes the date of a print.
+Self-contained: style and pictures are inline, nothing is fetched. The same input gives the same
+bytes: the browser adds the date of a print.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ def context(work: Work) -> dict[str, Any]:
 
 
 def preparations(works: Sequence[Work], findings: Sequence[Finding]) -> dict[str, Any]:
-    """Return the warnings, and the work that precedes the lay-up: cutting, printing, drying."""
+    """Return the warnings, and the work before the lay-up: cutting, printing, drying."""
     rules = {finding.rule for finding in findings if finding.verdict == "warn"}
     pressed = [work for work in works if work.schedule.steps]
     films = [film for film in films_of(works) if film.warning]
@@ -182,22 +182,22 @@ def _turned(laminate: Laminate) -> str:
 
 
 def _legend(work: Work) -> Iterator[tuple[str, str]]:
-    """Yield the name and the hex code of each colour of the solid."""
+    """Yield the name and hex code of each colour of the solid."""
     films = ", ".join(dict.fromkeys(film.material for film in work.films if not film.is_mask))
     for tone, words in KEY:
         yield films if tone == "film" else words, f"#{bytes(COLOURS[tone]).hex()}"
 
 
 def _other_marks(work: Work) -> dict[str, str]:
-    """Return a letter for each other design on the same sheets, so that labels stay short."""
+    """Return a letter for each other design on the same sheets, for short labels."""
     designs = {design for sheet in work.sheets for design, _, _ in sheet.counts}
     names = sorted(designs - {work.design.name})
     return {name: ascii_uppercase[i % 26] for i, name in enumerate(names, 1)}
 
 
 def _lay_up(laminate: Laminate) -> Iterator[tuple[Round, list[tuple[tuple[Layer, ...], str, str]]]]:
-    """Yield the rounds of layers, bottom to top; for each place of a round its layers, the part
-    that the first is cut from, as it is sorted and counted, and the pins that hold them.
+    """Yield the rounds of layers, bottom to top. For each place of a round: its layers, the part
+    from which the first is cut, as sorted and counted, and the pins that hold them.
     """
     pins_of = {
         index: joined_words([pin.name for pin in pins]) if pins else "none (by hand)"
@@ -219,7 +219,7 @@ QUIET = 4  # modules left white around the code, as its standard requires
 
 
 def record_text(name: str, sha256: str) -> str:
-    """Return the code's text, with the command that finds build records; it holds no link."""
+    """Return the text of the code, with the command that finds build records; it holds no link."""
     find = f"sbafab record --find {sha256[:SHORT_HASH]}"
     return f"{name}\nsha256 {sha256}\n{GENERATOR}\n{find}"
 
@@ -289,13 +289,13 @@ def acceptance(work: Work) -> dict[str, Any]:
 
 
 def _boxes(names: list[str]) -> list[str]:
-    """Return the labels of boxes, one for each of several; a single one needs none."""
+    """Return the labels of boxes, one for each of several; a single box needs none."""
     return names if len(names) > 1 else []
 
 
 def _tab_films(work: Work) -> dict[tuple[int, int], list[str]]:
-    """Return the chambers of drawn layers by the two films around their tube; empty if a tab has no
-    others.
+    """Return the chambers of drawn layers by the two films around their tube; empty for tabs with
+    no others.
     """
     laminate = work.laminate
     pairs: dict[tuple[int, int], list[str]] = {}
@@ -308,8 +308,8 @@ def _tab_films(work: Work) -> dict[tuple[int, int], list[str]]:
 
 
 def straight_run(laminate: Laminate, inlet: Inlet) -> float:
-    """Return the straight run of an inlet's channel inward from its mouth at constant width, mm; 0
-    without a channel there.
+    """Return the length of an inlet channel of constant width inward from its mouth, mm; 0 without
+    a channel.
     """
     (x, y), (u, v) = inlet.mouth, inlet.direction
 
@@ -330,8 +330,8 @@ def straight_run(laminate: Laminate, inlet: Inlet) -> float:
 
 
 class Proof(NamedTuple):
-    """The proof test's pressure in kPa, None if unknown; the estimated burst pressure, None without
-    a burst test of the film; and the pressure that the design or its kit states.
+    """The proof test's pressure in kPa (None if unknown), the estimated burst pressure (None
+    without a burst test of the film), and the stated pressure of the design or its kit.
     """
 
     kilopascals: float | None
@@ -345,7 +345,7 @@ class Proof(NamedTuple):
 
 def proof(work: Work) -> Proof:
     """Return the pressure of the proof test: the kit's, or less for an actuator that would burst
-    near it. For a film without a burst test it is the kit's or the design's own value, not the
+    near it. A film without a burst test takes the stated value of the kit or design, not the
     default.
     """
     stated = work.design.acceptance.proof_pressure_kpa
@@ -387,7 +387,7 @@ def _batch(work: Work) -> dict[str, Any] | None:
 
 
 def cycles_of(runs: Runs, size: int) -> str:
-    """Return the names of the cycles of a size as text."""
+    """Return the names of the cycles of one size as text."""
     numbers = [n for n, copies in enumerate(runs.cycles, 1) if copies == size]
     first, last = cycle_name(numbers[0]), cycle_name(numbers[-1])
     if len(numbers) == 1:
@@ -396,7 +396,7 @@ def cycles_of(runs: Runs, size: int) -> str:
 
 
 def _places_picture(work: Work, runs: Runs) -> str:
-    """Return the places on the base plate, numbered in the order of laying."""
+    """Return the places on the base plate, numbered in lay-up order."""
     laminate = work.laminate
     plate = whole_plate(laminate, work.design.press.platen, runs.places)
     low_x, low_y, high_x, high_y = plate.bounds
@@ -433,8 +433,8 @@ HandTask = Literal["none", "turn", "lay"]
 
 
 class ByEye(NamedTuple):
-    """The hand's task for layers of a pattern, and the edge to lay them along; ``layers`` are named
-    if others of that pattern lie along other edges.
+    """The manual alignment of layers of a pattern, and the reference edge. ``layers`` are named if
+    others of the pattern use other edges.
     """
 
     hand: HandTask
@@ -444,7 +444,7 @@ class ByEye(NamedTuple):
 
 
 class Lay(NamedTuple):
-    """Layers laid in one action: a round that repeats, many without repetition, or one."""
+    """Layers laid in one action: a repeated round, many without repetition, or one."""
 
     turns: list[Round]
     by_eye: list[ByEye]
@@ -456,7 +456,7 @@ class Lay(NamedTuple):
 
 @dataclass(frozen=True)
 class PressPage:
-    """A press step as its page, and its row on the first page, show it."""
+    """The values of a press step for its page and its row on the first page."""
 
     work: Work
     part: LayUpStep
@@ -476,7 +476,7 @@ class PressPage:
 
     @property
     def left_out(self) -> list[tuple[tuple[int, ...], int]]:
-        """The stacks of earlier steps that bond nothing, and the numbers of those steps."""
+        """The stacks of earlier steps that do not bond here, and the numbers of those steps."""
         steps = press_steps(self.work.laminate)
         loose = {part.layers: part.number for part in steps if _is_loose(self.work, part)}
         return [(stack, loose[stack]) for stack in self.part.stacks if stack in loose]
@@ -490,12 +490,12 @@ class PressPage:
 
     @property
     def height(self) -> float:
-        """Height of the films as bought, mm."""
+        """The height of the films as bought, mm."""
         return sum(self.work.laminate.layer(i).film.thickness for i in self.part.layers)
 
     @property
     def printed(self) -> list[str]:
-        """The patterns whose edges the underlay shows in this step; empty without one.
+        """The patterns with edges on the underlay in this step; empty without one.
 
         A print is used for one hot cycle: paper dries and shrinks, and lines wear.
         """
@@ -516,20 +516,20 @@ class PressPage:
 
     @property
     def punches(self) -> list[tuple[float, float, float]]:
-        """Diameter and seat of the pins of each size, and the diameter of their punch, mm."""
+        """The diameter and seat of the pins of each size, and the diameter of their punch, mm."""
         sizes = sorted({(pin.diameter_mm, pin.seat_mm) for pin in self.step.pin_settings})
         return [(diameter, seat, punch(diameter)) for diameter, seat in sizes]
 
     @property
     def foam(self) -> float:
-        """Thickness in mm of the soft support while pins are pushed out; 0 if the pad will do."""
+        """The thickness in mm of the soft support for pushing pins out; 0 if the pad is enough."""
         pins, step = self.step.pin_settings, self.step
         out = max(pin.stands_mm + pin.tolerance_mm - step.top_mm + pin.seat_mm for pin in pins)
         pad = next(item.thickness_mm for item in step.build_up if item.part == PAD)
         return 0.0 if pad > out else out + 1
 
     def edge(self, index: int) -> Alignment | None:
-        """Return what a layer, or a stack by its lowest, is aligned with; None if it is lowest."""
+        """The alignment of a layer, or of a stack by its lowest layer; None if it is lowest."""
         return None if self.things.is_lowest(index) else self.things.alignment(index)
 
     def lays(self, bed: Bed) -> Iterator[Lay]:
@@ -543,7 +543,7 @@ class PressPage:
                 yield Lay(together, self._by_eye(layers) if self.part.pins else [])
 
     def _by_eye(self, layers: Sequence[Layer]) -> list[ByEye]:
-        """Return what a hand decides about layers that no pin in the plate holds, or one alone."""
+        """Return the manual alignment of layers that no pin in the plate holds, or only one."""
         things = self.things
         hands = {layer.pattern: self._hand(layer) for layer in layers}
         # A pattern may lie on a larger film here and on a smaller one there.
@@ -566,7 +566,7 @@ class PressPage:
         ]
 
     def _hand(self, layer: Layer) -> HandTask:
-        """Return what the hand decides about a layer; a disc turned on its pin is unchanged."""
+        """Return the manual alignment of a layer; rotation does not change a disc on its pin."""
         laminate = self.work.laminate
         pins = [pin for pin in self.part.pins if pin in laminate.pins_holding(layer)]
         if not pins:
@@ -655,9 +655,9 @@ def joint_pages(work: Work) -> list[dict[str, Any]]:
 
 
 def _seam_page(laminate: Laminate, step: SeamStep, seam: Seam) -> dict[str, Any]:
-    """Return a seam: the ``start`` of its path mm to the right of and above the lower left corner
-    of the films as they lie; the layers laid for it (``lays``), each with whether the work so far
-    is laid on it; the highest layer of that work (``held``).
+    """Return a seam. ``start`` is the start of its path, mm right of and above the lower left
+    corner of the films as laid; ``lays`` are the layers laid for it, each with whether the previous
+    work is laid on it; ``held`` is the highest layer of that work.
     """
     layers_below = [index for index in step.layers if index not in step.adds]
     is_under = bool(layers_below) and not step.from_below
@@ -680,8 +680,8 @@ def _seam_page(laminate: Laminate, step: SeamStep, seam: Seam) -> dict[str, Any]
 def _plan_of(
     name: str, words: str, regions: Sequence[Region], beside: float, over: int = 1
 ) -> tuple[Picture, Matrix]:
-    """Return an empty picture for regions, with room ``beside`` them, mm, and their matrix;
-    ``over`` is -1 for work that is turned over, left to right.
+    """Return an empty picture for regions, with space ``beside`` them, mm, and their matrix;
+    ``over`` is -1 for work turned over, left to right.
     """
     low_x, low_y, high_x, high_y = box_round([region.bounds for region in regions])
     wide, high = high_x - low_x, high_y - low_y
@@ -692,7 +692,7 @@ def _plan_of(
 
 
 def _seam_picture(films: Sequence[Layer], step: SeamStep, seam: Seam) -> str:
-    """Return the films as they lie, the seam at its width, and its path."""
+    """Return the films as laid, the seam at its width, and its path."""
     words = f"Seam {step.seam} {'from below, turned over' if step.from_below else 'from above'}"
     shown = [*(layer.profile for layer in films), seam.region]
     over = -1 if step.from_below else 1
@@ -710,8 +710,8 @@ def _seam_picture(films: Sequence[Layer], step: SeamStep, seam: Seam) -> str:
 
 
 def _fold_page(laminate: Laminate, step: FoldStep, fold: Fold) -> dict[str, Any]:
-    """Return a fold, its film unfolded: the lengths of the lower and the upper half perpendicular
-    to the line, mm, and their ends in text.
+    """Return a fold, its film unfolded: the lengths of the lower and upper half perpendicular to
+    the line, mm, and their ends in text.
     """
     (x0, y0), (x1, y1) = fold.line
     degrees = math.degrees(math.atan2(y1 - y0, x1 - x0))

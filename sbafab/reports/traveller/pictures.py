@@ -1,4 +1,4 @@
-"""The pages' pictures: patterns, a step from above and taken apart, sheets with their parts named.
+"""The pages' pictures: patterns, a step in plan and exploded, sheets with labelled parts.
 
 Pictures are inline SVG in millimetres. Masks are hatched as well as coloured, so that they differ
 from structural films in a grey print.
@@ -36,7 +36,7 @@ PLATE = "#f1f1ef"
 
 
 def definitions(regions: Iterable[tuple[str, Region]]) -> str:
-    """Return the outlines that pictures refer to by id, in a picture of zero size."""
+    """Return the outlines that pictures reference by id, in a picture of zero size."""
     paths = (
         f'<path id="{name}" d="{path_data(region)}" fill-rule="evenodd"/>'
         for name, region in regions
@@ -48,8 +48,8 @@ def definitions(regions: Iterable[tuple[str, Region]]) -> str:
 
 
 def pattern_id(pattern: str, is_flat: bool = False) -> str:
-    """Return the id of a pattern's outline, or of the part cut folded out or turned over; "A P03"
-    has a space, which ids must not have.
+    """Return the id of the outline of a pattern, or of a part cut unfolded or turned over, without
+    spaces.
     """
     return f"shape-{pattern.replace(' ', '-')}{'-flat' if is_flat else ''}"
 
@@ -65,7 +65,7 @@ def pattern_regions(laminate: Laminate) -> Iterator[tuple[str, Region]]:
 class Picture:
     """An inline SVG under construction: its elements in drawing order, and its hatches.
 
-    ``name`` is unique on the page; ``words`` are its text alternative.
+    ``name`` is unique on the page; ``words`` is its text alternative.
     """
 
     def __init__(self, name: str, width: float, height: float, words: str) -> None:
@@ -98,14 +98,14 @@ class Picture:
         self.add(f'<g transform="matrix({" ".join(map(coord, matrix))})">', *elements, "</g>")
 
     def plate(self, plate: Region, matrix: Matrix, is_used: bool = True) -> None:
-        """Add the base plate; dashed if it is not used, as it still shows the orientation."""
+        """Add the base plate; dashed if unused, since it still shows the orientation."""
         scale = matrix[0]
         dashes = "" if is_used else f"{coord(1.6 / scale)} {coord(1.2 / scale)}"
         look = draw.style(draw.GREY, 0.25 / scale, fill=PLATE if is_used else "none", dashes=dashes)
         self.place(matrix, draw.path(path_data(plate), look))
 
     def label(self, at: Point, words: str, size: float = draw.SMALL) -> None:
-        """Add text over a drawing, with a white rim for legibility."""
+        """Add text over a drawing, with a white outline for legibility."""
         x, y = map(coord, at)
         self.add(
             f'<text x="{x}" y="{y}" font-size="{coord(size)}" text-anchor="middle" '
@@ -137,7 +137,7 @@ def flat(scale: float, at: Point) -> Matrix:
 
 
 def thumbnail(pattern: str, is_flat: bool, film: Film, bounds: Bounds) -> str:
-    """Return a small picture of a pattern, as it is cut."""
+    """Return a small picture of a pattern as cut."""
     low_x, low_y, high_x, high_y = bounds
     scale = min((THUMB[0] - 1) / (high_x - low_x), (THUMB[1] - 1) / (high_y - low_y))
     picture = Picture(f"thumb-{pattern}", *THUMB, f"outline of pattern {pattern}")
@@ -148,7 +148,7 @@ def thumbnail(pattern: str, is_flat: bool, film: Film, bounds: Bounds) -> str:
 
 
 def _shared(a: Bounds, b: Bounds) -> float:
-    """Return the area that two boxes share."""
+    """Return the common area of two boxes."""
     wide, high = min(a[2], b[2]) - max(a[0], b[0]), min(a[3], b[3]) - max(a[1], b[1])
     return max(wide, 0.0) * max(high, 0.0)
 
@@ -177,7 +177,7 @@ _section = cached(section)
 
 
 class PlanName(NamedTuple):
-    """A name to put beside ``at``, a place ``clear`` mm around, best in the direction ``out``."""
+    """A name for ``at``, a place ``clear`` mm around, preferably in the direction ``out``."""
 
     words: str
     at: Point
@@ -186,7 +186,7 @@ class PlanName(NamedTuple):
 
 
 def plan(laminate: Laminate, step: LayUpStep, lying: tuple[Bed, ...], name: str) -> str:
-    """Return the step from above; earlier stacks grey, new layers in their film's colour."""
+    """Return the step in plan; earlier stacks grey, new layers in the colour of their film."""
     plate = shown(laminate)
     low_x, low_y, high_x, high_y = laminate.bounds
     if plate is None:
@@ -252,8 +252,8 @@ def _mark(picture: Picture, laminate: Laminate, step: LayUpStep, view: Matrix) -
 def _free_place(
     name: PlanName, room: Bounds, taken: Sequence[Bounds]
 ) -> tuple[Point, float, Bounds]:
-    """Return middle, distance and box of the place of a name that covers least and is not outside
-    the room; of equal ones the nearest to its best one.
+    """Return centre, distance and box of the position within the room where a name covers least; of
+    equal ones the nearest to its preferred position.
     """
     (x, y), half = name.at, (draw.text_width(name.words, NAMES) / 2, NAMES / 2)
     best = math.atan2(name.out[1], name.out[0])
@@ -272,14 +272,14 @@ def _free_place(
 
 
 def _reach(laminate: Laminate, inlet: Inlet) -> float:
-    """Return the largest distance in mm by which an inlet's strip passes its mouth."""
+    """Return the largest extension in mm of an inlet strip past its mouth."""
     shapes = (layers[0].profile for layers in laminate.patterns.values())
     spans = [span for shape in shapes for span in _section(shape, inlet.mouth, inlet.direction)]
     return max((end for _, end in spans), default=0.0)
 
 
 def _datum(picture: Picture, step: LayUpStep, view: Matrix, has_plate: bool) -> None:
-    """Add the cross at the actuator's axis, as in every cut file, unless a pin stands there."""
+    """Add the cross at the actuator's axis, as in every cut file, unless there is a pin."""
     at = EDGE + KEY * has_plate, picture.height - 1.2
     pin = next((pin for pin in step.pins if math.hypot(*pin.centre) < AT_DATUM), None)
     words = "+ datum" if pin is None else f"datum: middle of pin {pin.name}"
@@ -291,7 +291,7 @@ def _datum(picture: Picture, step: LayUpStep, view: Matrix, has_plate: bool) -> 
 
 
 def _captions(picture: Picture, is_pinned: bool) -> None:
-    """Add the key of the pins under the picture, and the words on the plate above it."""
+    """Add the key of the pins below the picture, and the text about the plate above it."""
     y = picture.height - 1.2
     for x, is_in, words in ((EDGE, True, "pin"), (EDGE + 7.2, False, "no pin")):
         picture.add(draw.circle((x + 0.8, y - 0.8), 0.8, PINS[is_in]))
@@ -318,7 +318,7 @@ STANDS_OUT = 4.0  # height of a pin above the highest level, mm on the page
 
 
 class Level(NamedTuple):
-    """The layers at one height, drawn on each other, and their label.
+    """The superimposed layers of one height, and their label.
 
     ``made``: bonded in an earlier step; ``round``: laid repeatedly.
     """
@@ -331,7 +331,7 @@ class Level(NamedTuple):
 
 
 class _Tilted(NamedTuple):
-    """The view of a step taken apart: the laminate's origin is at ``middle`` and ``ground``."""
+    """The exploded view of a step: the laminate's origin is at ``middle`` and ``ground``."""
 
     scale: float
     middle: float
@@ -345,7 +345,7 @@ class _Tilted(NamedTuple):
 
 
 def exploded(laminate: Laminate, step: LayUpStep, lying: Sequence[Bed], name: str) -> str:
-    """Return the step's layers one above the other, lowest first, with numbers and patterns.
+    """Return the step's layers exploded, lowest first, with numbers and patterns.
 
     They are drawn from the front and above, so that outlines and tabs show the orientation of each.
     """
@@ -403,7 +403,7 @@ def _levels(laminate: Laminate, bed: Bed) -> Iterator[Level]:
 
 
 def _shortened(levels: list[Level]) -> list[Level]:
-    """Return the levels to draw, few enough; the lay-up table has them all."""
+    """Return the levels to draw; the lay-up table lists them all."""
     if len(levels) <= MOST:
         return levels
     hidden = levels[MOST - 5 : -4]
@@ -413,7 +413,7 @@ def _shortened(levels: list[Level]) -> list[Level]:
 
 
 def _labels(levels: Sequence[Level], gap: float) -> float:
-    """Return the room beside the layers for the longest label and the bracket behind it, mm."""
+    """Return the space beside the layers for the longest label and its bracket, mm."""
     if gap >= TWO_LINES:
         return LABELS
     lengths = (
@@ -438,7 +438,7 @@ def _name_level(picture: Picture, level: Level, edge: Point, gap: float) -> None
 
 
 def _pin_stretches(pins: Sequence[Pin], view: _Tilted, under: float, over: float) -> Iterator[str]:
-    """Yield the stretch of every pin between two levels, rear pins first."""
+    """Yield the part of every pin between two levels, rear pins first."""
     for pin in sorted(pins, key=lambda pin: (-pin.centre[1], pin.centre[0])):
         x, back = view.middle + pin.centre[0] * view.scale, pin.centre[1] * view.scale * TILT
         look = draw.style("#6b7178", max(pin.diameter * view.scale * 0.8, 0.6))
@@ -473,7 +473,7 @@ QUARTERS = ((1, 0), (0, 1), (-1, 0), (0, -1))  # cosine and sine of the turns
 
 
 def part_regions(sheets: Sequence[SheetFile]) -> Iterator[tuple[str, Region]]:
-    """Yield the parts that lie on the sheets by id; all sheets of a material share one nest."""
+    """Yield the parts on the sheets by id; all sheets of a material share one nest."""
     for sheet in {sheet.material: sheet for sheet in reversed(sheets)}.values():
         for index, part in enumerate(sheet.nest.parts):
             yield _part_id(sheet, index), part.region
@@ -484,11 +484,11 @@ def _part_id(sheet: SheetFile, index: int) -> str:
 
 
 class SheetView(NamedTuple):
-    """The sheet's scale and length on the page, mm, if it were drawn in one row.
+    """The sheet's scale and length on the page, mm, if drawn in one row.
 
-    It is drawn in ``rows``, each a part of its length, the first on top. ``turned`` lays the
-    sheet's length across the page, its lower left corner at the upper left. The picture ends above
-    ``used`` mm of the sheet.
+    It is drawn in ``rows``, each a part of its length, the first at the top. ``turned`` lays the
+    sheet's length across the page, with its lower left corner at the upper left. The picture ends
+    above ``used`` mm of the sheet.
     """
 
     scale: float
@@ -518,7 +518,7 @@ class SheetView(NamedTuple):
 def sheet_rows(
     design: Design, sheets: Sequence[SheetFile], marks: Mapping[str, str]
 ) -> list[dict[str, Any]]:
-    """Return the film sheets of a design, with the count of each pattern, after the mark or the
+    """Return the film sheets of a design, with the count of each pattern, prefixed by the mark or
     name of its design, and their pictures.
     """
     films = {film.material: film for film in design.films.stock.values()}
@@ -535,7 +535,7 @@ def sheet_rows(
 
 
 def _marked(design: str, pattern: str, marks: Mapping[str, str]) -> str:
-    """Return a pattern after the mark of its design, or after the design's name without a mark."""
+    """A pattern prefixed by the mark of its design, or by the design's name without a mark."""
     return f"{marks.get(design, design)} {pattern}".lstrip()
 
 
@@ -559,9 +559,9 @@ def _sheet_view(sheet: SheetFile) -> SheetView:
 
 
 def sheet_map(sheet: SheetFile, film: Film, marks: Mapping[str, str], name: str) -> str:
-    """Return the sheet in plan, its lower left corner at the lower left; a long one in rows.
+    """Return the sheet in plan, with its lower left corner at the lower left; a long one in rows.
 
-    The label of a part is its pattern after the mark of its design, or the design's name.
+    The label of a part is its pattern, prefixed by the mark of its design or the design's name.
     """
     view = _sheet_view(sheet)
     wide, high = view.length / view.rows, view.height
@@ -628,8 +628,8 @@ PlacedLabel = tuple[Point, float, Bounds]
 
 
 def labels(words: str, part: Region) -> list[PlacedLabel]:
-    """Return legible positions for a text on a drawn part, the best first: on its film, near its
-    middle and large.
+    """Return legible positions for a text on a drawn part, best first: on its film, near its middle
+    and large.
     """
     import shapely
 

@@ -49,7 +49,7 @@ DEVICE = "step decision reason photograph note initials"
 
 class RecordTable(NamedTuple):
     """A table of the record page: its title and fields, and a row for each item of the first field,
-    with the values that are set.
+    with preset values.
     """
 
     title: str
@@ -75,7 +75,7 @@ def _table(title: str, names: str, rows: Mapping[str, str]) -> RecordTable:
 
 
 def _set_values(step: Step | SeamStep) -> str:
-    """Return the values set by the schedule, as text."""
+    """Return the values preset by the schedule, as text."""
     heat = "" if step.temperature_c is None else f"{step.temperature_c:g} °C"
     if isinstance(step, SeamStep):
         return heat

@@ -1,4 +1,4 @@
-"""A build with its sheets, as the pages for the bench show it: its times, materials and parts."""
+"""A build with its sheets, as shown on the pages for the bench: times, materials and parts."""
 
 from __future__ import annotations
 
@@ -33,8 +33,8 @@ CURE_HOURS = 24.0  # of the tubes' adhesive if neither order nor kit states them
 class Work(Build):
     """A build with the ``sheets`` for all copies.
 
-    ``folder`` is the path from the page to the design's files, ``solid_png`` the bytes of the
-    solid's picture.
+    ``folder`` is the path from the page to the design's files, ``solid_png`` the picture of the
+    solid, as bytes.
     """
 
     sheets: Sequence[SheetFile] = ()
@@ -43,7 +43,7 @@ class Work(Build):
 
     @property
     def copies(self) -> int:
-        """Number of actuators to make."""
+        """The number of actuators to make."""
         return self.design.order.quantity
 
     @cached_property
@@ -58,14 +58,14 @@ class Work(Build):
 
     @cached_property
     def underlay(self) -> str | None:
-        """The path of the page to lay up on; None if pins hold every part in every step."""
+        """The path of the lay-up page; None if pins hold every part in every step."""
         return f"{self.folder}{NAME}" if guides(self.laminate) else None
 
 
 class Times(NamedTuple):
-    """Minutes: ``warm`` before the clock of every step, ``cool`` after it, ``cure`` and ``test`` of
-    one actuator, and the minutes ``worked`` until its tubes are glued, at least: press minutes
-    that are not stated count as 0.
+    """The minutes ``warm`` before the clock of every step, ``cool`` after it, ``cure`` and ``test``
+    of one actuator, and at least ``worked`` until its tubes are glued: unstated press minutes count
+    as 0.
     """
 
     warm: float
@@ -97,9 +97,9 @@ def times(work: Work) -> Times:
 
 
 def assembly_times(works: Sequence[Work]) -> dict[str, Any]:
-    """Return the minutes that an assembly takes before its parts can be joined: ``waited`` for
-    plates to warm and cool, ``worked`` until all tubes are glued, and the longest ``cure``;
-    ``is_known``: all press minutes are stated.
+    """Return the minutes before the parts of an assembly can be joined: ``waited`` for plates to
+    warm and cool, ``worked`` until all tubes are glued, and the longest ``cure``; ``is_known``: all
+    press minutes are stated.
     """
     waited = handled = cure = 0.0
     for work in works:
@@ -123,8 +123,8 @@ BILL_COLUMNS = ("item", "specification", "needed", "area_m2", "quantity")
 class Item(NamedTuple):
     """A row of the bill of materials.
 
-    ``quantity`` is a text, ``number`` the count needed, None if it is not counted; ``area`` in m2
-    is the total area of film.
+    ``quantity`` is a text, ``number`` the count needed, None if uncounted; ``area`` is the total
+    area of film in m2.
     """
 
     name: str
@@ -148,12 +148,12 @@ def bill_csv(work: Work) -> str | None:
 
 
 def bill(work: Work) -> list[Item]:
-    """Return everything needed before the work starts, for all copies."""
+    """Return all materials for all copies."""
     return [*film_items([work]), *_tubes(work), *_wrap(work), *_supplies(work)]
 
 
 def items_of_part(work: Work) -> list[Item]:
-    """Return the needs of a design in an assembly beside films; its wrap is the assembly's part."""
+    """The materials of a design in an assembly besides films; its wrap belongs to the assembly."""
     return [*_tubes(work), *_supplies(work)]
 
 
@@ -191,7 +191,7 @@ def _tubes(work: Work) -> Iterator[Item]:
 
 
 def adhesive_words(work: Work) -> str:
-    """Return the adhesive of the tubes; if none is stated, a blank and what it must bond."""
+    """Return the adhesive of the tubes; if unstated, a blank and the materials to be bonded."""
     films = work.laminate.glued_films
     adhesive = adhesive_for(work.design, films)
     if adhesive is not None:
@@ -211,7 +211,7 @@ def _wrap(work: Work) -> Iterator[Item]:
 
 
 def _supplies(work: Work) -> Iterator[Item]:
-    """Yield what the press needs: pins, plate, films, pad, and prints to lay up on."""
+    """Yield the supplies of the press: pins, plate, films, pad, and prints for the lay-up."""
     if work.schedule.steps:
         yield from _pins(work)
         yield from _build_up(work)
@@ -313,14 +313,14 @@ def _trays(work: Work) -> int:
 
 
 def release_films(work: Work) -> int:
-    """Return the release films for all cycles: two new ones each time the press closes on a step,
-    and one for films that are turned over.
+    """Return the release films for all cycles: two new ones for each closing of the press, and one
+    for films that are turned over.
     """
     return 2 * work.cycles.count * len(work.schedule.steps) + turns_over(work)
 
 
 def turns_over(work: Work) -> bool:
-    """Return True if films are turned over, so that their pins can be pushed out."""
+    """Return True if films are turned over for pushing out their pins."""
     return any(step.pin_settings for step in work.schedule.steps)
 
 
@@ -328,7 +328,7 @@ def turns_over(work: Work) -> bool:
 
 
 def cut_list(work: Work) -> list[dict[str, Any]]:
-    """Return every pattern that is cut, once, in the order of its first layer."""
+    """Return every cut pattern once, in the order of its first layer."""
     return [
         _cut(work, layers)
         for layers in work.laminate.patterns.values()

@@ -58,7 +58,7 @@ export class Dialogs {
   async unpacked(words) {
     const raw = Uint8Array.from(atob(words.replaceAll("-", "+").replaceAll("_", "/")), (c) => c.charCodeAt(0));
     const text = await new Response(new Blob([raw]).stream().pipeThrough(new DecompressionStream("deflate-raw"))).text();
-    if (!text) throw new Error("The link holds no design; copy it whole, up to its last letter.");
+    if (!text) throw new Error("The link holds no design; copy the complete link.");
     return text;
   }
 }

@@ -64,7 +64,7 @@ async function start() {
 async function begin() {
   const draft = studio.draft();
   if (linkedDesign) {
-    try { studio.open(await dialogs.unpacked(linkedDesign), { saved: "" }); history.replaceState(null, "", location.pathname); return; } catch { notice("The link holds no design; copy it whole, up to its last letter.", true); }
+    try { studio.open(await dialogs.unpacked(linkedDesign), { saved: "" }); history.replaceState(null, "", location.pathname); return; } catch { notice("The link holds no design; copy the complete link.", true); }
   }
   if (draft && draft.text !== draft.savedText) {
     const { name, text, savedText, seen } = draft;

@@ -153,7 +153,7 @@ export class Nets {
     if (!this.map || !this.gap) return;
     const box = this.surface.getBoundingClientRect(), [x, y] = this.eye.at(event.clientX - box.left, event.clientY - box.top);
     const there = this.map.areas.find((one) => one.interface === this.gap && contains(this.studio.shape(one.shape), x, y));
-    this.studio.hover(null, `${there ? `${there.nets.length > 1 ? `short of ${there.nets.join(" and ")}` : there.nets.length ? `net ${there.nets[0]}` : "a void of no net"} · ` : ""}x ${plain(x, 2)}, y ${plain(y, 2)} mm`);
+    this.studio.hover(null, `${there ? `${there.nets.length > 1 ? `short of ${there.nets.join(" and ")}` : there.nets.length ? `net ${there.nets[0]}` : "a void without a net"} · ` : ""}x ${plain(x, 2)}, y ${plain(y, 2)} mm`);
   }
   async picture() { return { name: "nets.svg", blob: svgBlob(this.svg) }; }
 }
