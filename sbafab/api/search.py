@@ -23,6 +23,7 @@ from sbafab.search.find import (
     FoundDesign,
     find_document,
     found_toml,
+    free_keys,
     refuse_existing,
     write_found,
 )

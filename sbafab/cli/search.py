@@ -24,7 +24,7 @@ If no design meets all requirements, the nearest miss is shown, no file is writt
 code is 1. A quantity may name its pressure P and height H with units, such as force@12.5mm@50kPa
 or, flat, force@0mm@50kPa. Without a pressure it is at the highest that another one names, or at
 10 kPa. H in % is of the reference stroke, force@50%, which round pockets have of the paper's film
-alone. If inlet tabs may stand out, ask for outline_diameter:
+alone:
 
 \b
 {quantities}
@@ -77,6 +77,11 @@ def find(source: str, to: Path | None, out: Path, as_json: bool, **options: Any)
     target = opt.design_file(to, out, FOUND)
     request = _request(source, options)
     api.refuse_existing(target)
+    if _counts_tabs(request):
+        show.note(
+            "overall_diameter counts the inlet tabs; use outline_diameter if they may stand out, "
+            "or add --free inlet.tab_length=3:5:0.5"
+        )
     with show.progress(as_json) as progress:
         result = api.run_find(request, progress)
     if result.holds:
@@ -104,6 +109,13 @@ def _request(source: str, options: dict[str, Any]) -> api.FindRequest:
     return api.FindRequest(
         design, requirements, goal, free, tries=options["tries"], sure=options["sure"]
     )
+
+
+def _counts_tabs(request: api.FindRequest) -> bool:
+    """Return True if a search limits the diameter with tabs, and may not shorten these."""
+    names = [requirement.quantity.name for requirement in request.requirements]
+    free = [free.key for free in api.free_keys(request)]
+    return "overall_diameter" in names and "inlet.tab_length" not in free
 
 
 # Printing of a result.
