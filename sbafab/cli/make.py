@@ -166,7 +166,7 @@ def _run(
 ) -> None:
     """Write a folder, print it and exit with 1 if a rule failed.
 
-    ``before`` prints the text above the files, ``more`` has further keys of the document.
+    ``before`` prints the lines before the files; ``more`` has additional keys of the document.
     """
     with show.progress(as_json) as progress:
         run = write(source, progress=progress, **settings)
@@ -409,9 +409,9 @@ def simulate(design: Design, as_json: bool, **settings: Any) -> None:
 
     OUT/<name>/calculix/ receives stroke, air volume and wall stress over pressure as a table, and
     the deformed shape as VTU; OUT/<name>/sofa/ or mujoco/ the input files of the run. result.json
-    holds height, tip, tilt and volumes over time. If a run stops early, its
-    results are kept and the exit code is 1. A result that cannot be, such as air below 0, is void:
-    the reason is printed, the log is kept beside, and the exit code is 1.
+    holds height, tip, tilt and volumes over time. If a run stops early, its results are kept and
+    the exit code is 1. An impossible result, such as a negative volume of air, is void: the reason
+    is printed, the log is kept, and the exit code is 1.
     """
     with show.progress(as_json) as progress, _printed_warnings():
         simulation = runs.simulate(design, progress=progress, **settings)

@@ -98,7 +98,7 @@ def find(source: str, to: Path | None, out: Path, as_json: bool, **options: Any)
 
 
 def _request(source: str, options: dict[str, Any]) -> api.FindRequest:
-    """Return the search from a design. Raises DesignError without a requested quantity."""
+    """Return the search request of a design. Raises DesignError without a requested quantity."""
     limits = (options[name] for name in ("least", "most", "best", "flow_ml_min"))
     requirements, goal = api.read_all(*limits)
     assigned = options["assignments"]

@@ -144,7 +144,7 @@ def _properties(
 
 
 def kerf_properties(kerf: Kerf | None) -> dict[str, str]:
-    """Return a cut file's statement on its kerf."""
+    """Return a cut file's kerf statement."""
     if kerf is None:
         return {"KERF_STATE": UNCALIBRATED, "KERF_WIDTH": "none"}
     return {"KERF_STATE": COMPENSATED, "KERF_WIDTH": kerf_text(kerf)}

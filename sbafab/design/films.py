@@ -45,7 +45,7 @@ Modulus = Annotated[float, Field(gt=0, le=1e6), MEGAPASCALS]
 
 def _poisson(value: object) -> object:
     if isinstance(value, int | float) and value >= 0.5:
-        raise ValueError("must be less than 0.5; for rubber, which keeps its volume, write 0.49")
+        raise ValueError("must be less than 0.5; for incompressible rubber, write 0.49")
     return value
 
 

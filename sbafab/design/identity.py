@@ -119,7 +119,9 @@ def tube_name(design: Design) -> str:
 
 def adhesive_for(design: Design, films: Iterable[Film]) -> str | None:
     """Return the adhesive that bonds tubes to these films; None if it is the kit's and they are not
-    listed. An adhesive outside the kit is the designer's choice.
+    listed.
+
+    An adhesive outside the kit is the designer's choice.
     """
     adhesive = kit_of(design).record.adhesives.get(design.inlet.adhesive)
     if adhesive is None or all(film.product in adhesive.bonds for film in films):

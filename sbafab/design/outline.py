@@ -182,7 +182,7 @@ def _traced(
 
 
 def _contours(polylines: Iterable[Polyline], most: int) -> list[Contour]:
-    """Return the contours that polylines of at most ``most`` edges close to. Raises DesignError."""
+    """Return the contours formed by polylines of at most ``most`` edges. Raises DesignError."""
     chains = [c for c in counted(polylines, most) if sum(edge.length for edge in c) > JOIN]
     contours = []
     for loop in _closed_loops(chains):

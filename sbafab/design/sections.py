@@ -37,30 +37,31 @@ class OrderSection(Section):
     copies: int = Field(default=1, ge=1, le=MOST)
     """Number of actuators made; more if order.good needs more."""
     success_rate: float = Field(default=0.9, gt=0, le=1)
-    """Share of builds that succeed (paper Sec. 4: under 10 % failed). Take your lab's own from
-    "sbafab record --report" once it has one."""
+    """Share of builds that succeed (paper Sec. 4: under 10 % failed). Replace it by your lab's own,
+    from "sbafab record --report", once there is one."""
     certainty: float = Field(default=0.8, gt=0, lt=1)
-    """Probability that at least order.good succeed (ours): 20 good ones at 0.9 take 23 with 0.81,
-    24 with 0.91, 25 with 0.97."""
+    """Probability that at least order.good succeed (ours): 20 good ones at 0.9 need 23 builds for
+    0.81, 24 for 0.91, 25 for 0.97."""
     good: int | None = Field(default=None, ge=1, le=MOST)
-    """Number that must succeed. order.success_rate and order.certainty determine how many more are
-    made; none by default."""
+    """Number that must succeed. order.success_rate and order.certainty determine the additional
+    builds; none by default."""
     spare_share: float = Field(default=0.05, ge=0, le=2)
     """Spare parts as a share of the number that the actuators need of each pattern, rounded up
     (ours). A part lost or torn at the press otherwise means recutting."""
     spares: int = Field(default=1, ge=0, le=100)
-    """The fewest spares of a pattern, films and masks alike; 0, with spare_share = 0, cuts none."""
+    """Least number of spares of a pattern, for films and masks; 0, with spare_share = 0, cuts
+    none."""
     at_once: int | None = Field(default=None, ge=1, le=MOST)
-    """Most copies in one press cycle, as far as the heated area has room for them; by default as
-    many as one person lays up and presses in 8 hours (ours)."""
+    """Maximum copies in one press cycle, as far as they fit the heated area; by default the number
+    that one person lays up and presses in 8 hours (ours)."""
     batch: str | None = Field(default=None, pattern=BATCH_PATTERN)
-    """Name of the batch, before its serials: "24" makes "24-A-03" of "A-03". None by default; set
-    one if a design is made again, as records identify an actuator by design and serial."""
+    """Name of the batch, a prefix of its serials: "24" makes "24-A-03" of "A-03". None by default;
+    set one if a design is made again, since records identify an actuator by design and serial."""
     tray: bool | None = None
     """True if a tray plan (tray.pdf, 1:1) is written; by default for more than one copy."""
     cure_hours: float | None = Field(default=None, gt=0, le=168)
-    """Hours in which the adhesive of the tubes cures, by its package; by default the time of the
-    kit's adhesive, else the traveller's times assume 24 (ours)."""
+    """Cure time of the tubes' adhesive in hours, from its package; by default that of the kit's
+    adhesive, else the traveller assumes 24 (ours)."""
     made_for: str = Field(default="", max_length=120)
     """Printed on the traveller."""
     note: str = Field(default="", max_length=400)
@@ -172,7 +173,7 @@ class Mask(Section):
     """The PTFE film that separates films."""
 
     overhang: Length = 0.5
-    """Distance by which a mask reaches past the edges of the TPE layers it keeps apart."""
+    """Distance by which a mask extends past the edges of the TPE layers that it separates."""
 
 
 class Bore(Section):
@@ -182,10 +183,10 @@ class Bore(Section):
     """Channel between the balloons of a chamber, and hole for its dowel pin (the paper gives
     none)."""
     clearance: Annotated[float, Millimetres(0, 1)] = 0.04
-    """Excess of the bore over its dowel pin in diameter. Ours: what registration leaves, for 0.75 -
-    2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must be left of a bond at worst."""
+    """Excess of the bore over its dowel pin in diameter. Ours: the value allowed by registration,
+    since 0.75 - 2 x (0.1 + 0.004 + 0.02) is just the 0.5 that must remain of a bond at worst."""
     pin_diameter: Length | None = None
-    """Dowel pin of the bore; by default the bore less the clearance."""
+    """Dowel pin of the bore; by default the bore minus the clearance."""
 
     @property
     def pin(self) -> float:
@@ -233,43 +234,42 @@ class Registration(Section):
     pin_diameter: Length = 1.5
     """Dowel pins of the ears."""
     full_bond_pins: Literal["out", "in"] = "out"
-    """Ears: "out" tacks base and cap on the pins by a flash bond and draws the pins before the full
-    bond, as the paper keeps pins out of molten TPE; "in" leaves them in, under a release sleeve or
-    coat. Neither was tried."""
+    """Ears: "out" tacks base and cap on the pins by a flash bond and removes the pins before the
+    full bond, since the paper keeps pins out of molten TPE; "in" leaves them in, under a release
+    sleeve or coat. Both are untested."""
     sequence: Literal["bottom-first", "middle-first"] | None = None
     """Order of stacking. "bottom-first" (default, the paper's): the bottom balloon with its base,
     then the middle layers on the pins, then both with the top layer. "middle-first": all layers
-    between base and cap on the pins, then base and cap; one placement by hand less, not tried."""
+    between base and cap on the pins, then base and cap; one hand placement fewer, untested."""
     pin_clearance: Annotated[float, Millimetres(0, 1)] = 0.0
-    """Excess of the ears' holes over their pins in diameter; it adds up over as many as three
-    steps."""
+    """Excess of the ears' holes over their pins in diameter; it adds up over up to three steps."""
     pin_stretch: float = Field(default=0.3, ge=0, le=2)
-    """The most by which a hole may be stretched over its pin, as a share of itself. Ours, untested:
-    less than a tenth of the 400 % that cast PTFE film of 0.025 mm must stand before it tears (ASTM
-    D3369, Table 1); skived film stands less, TPE more."""
+    """Maximum strain of a hole over its pin. Ours, untested: less than a tenth of the 400 % that
+    cast PTFE film of 0.025 mm must reach before it tears (ASTM D3369, Table 1); skived film reaches
+    less, TPE more."""
     pin_standard: Literal["ISO 8734", "ISO 2338"] = "ISO 8734"
     """Standard for the diameters and lengths of dowel pins; order them ground to m6."""
     pin_lengths: tuple[Length, ...] = Field(default=(), max_length=30, strict=False)
-    """Lengths of pins that you have, in place of the standard's."""
+    """Lengths of pins in stock, instead of the standard's."""
     cutting_error: Annotated[float, Millimetres(0, 1)] = 0.1
-    """The most by which a cut edge lies off its place (paper Sec. 2)."""
+    """Maximum displacement of a cut edge (paper Sec. 2)."""
     plate_made_by: PlateMachine = "jig-borer"
-    """Machine for the holes of the base plate: "jig-borer" (places to 0.003, each hole lapped to
-    its pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed
+    """Machine for the holes of the base plate: "jig-borer" (position error 0.003, each hole lapped
+    to its pin), "cnc-mill" (0.025, reamed H7) or "drill-press" (marked out by hand, 0.2, reamed
     H7)."""
     pin_error: Annotated[float, Millimetres(0, 1)] | None = None
-    """The most by which a layer on its pins lies off its place; by default what plate_made_by
-    gives: a jig borer the paper's 0.004 (Sec. 2), a CNC mill 0.029, a drill press 0.204. The place
-    of a plate's only pin does not count: there each gives 0.004."""
+    """Maximum displacement of a layer on its pins; by default that of plate_made_by: for a jig
+    borer the paper's 0.004 (Sec. 2), for a CNC mill 0.029, for a drill press 0.204. The position of
+    a plate's only pin does not count: each then gives 0.004."""
     hand_placement: Annotated[float, Millimetres(0, 5)] = 0.08
-    """The most by which a part without pins lies off the part below. The paper gives none: this,
-    with hand_turn, is calibrated so that the designs it built keep their limits as often as it
-    succeeded, nine times in ten. A rougher hand takes larger values of both."""
+    """Maximum displacement of a part without pins from the part below. The paper gives none: this,
+    with hand_turn, is calibrated so that the paper's designs keep their limits at its success rate,
+    nine in ten. Less accurate placement needs larger values of both."""
     hand_turn: float = Field(default=0.4, ge=0, le=10)
-    """Degrees: the most by which a part on fewer than two pins is turned. Calibrated together with
+    """Degrees: maximum rotation of a part on fewer than two pins. Calibrated together with
     hand_placement."""
     seam_error: Annotated[float, Millimetres(0, 5)] | None = None
-    """The most by which a seam lies off its path, whatever its tool; by default cutting_error for a
+    """Maximum displacement of a seam from its path, for any tool; by default cutting_error for a
     laser, which the same machine moves, and 0.3 for other tools: ours, not measured."""
 
     @property
@@ -296,8 +296,8 @@ class SeamToolSection(Section):
     """The mounting of a seam tool on its machine."""
 
     offset: Annotated[tuple[MountCoordinate, MountCoordinate], Field(strict=False)]
-    """Position of its middle, x and y from the laser or pen head that sets the machine's origin.
-    Seam files are shifted by minus that; everything else shows seams where they are made."""
+    """Position of its middle, x and y from the laser or pen head that defines the machine's origin.
+    Seam files are shifted by minus this offset; all other output shows seams in place."""
 
 
 class SeamTools(Section):
@@ -378,11 +378,11 @@ class Press(Section):
     platen_width: Length = 152.4
     """Heated area; the paper's press has 6 x 6 in."""
     platen_length: Length = 152.4
-    """Heated area, the other way."""
+    """Heated area, in the other direction."""
     plate_material: str = Field(default="steel", max_length=80)
     """Base plate, as large as the platen: under every lay-up, with the holes for the pins."""
     plate_thickness: Length | None = None
-    """Thickness of the base plate; by default the thinnest plate sold, from 6 mm, that holds the
+    """Thickness of the base plate; by default the thinnest stock plate, from 6 mm, that holds the
     pins."""
     release_film: str = Field(default="PTFE film", max_length=80)
     """Release film, to which TPE does not stick, one sheet below and one above (the paper names
@@ -394,7 +394,7 @@ class Press(Section):
     pad_material: Literal["silicone sponge", "silicone rubber"] = "silicone sponge"
     """Press pad: the compliant sheet, as large as the platen, that spreads the force (ours)."""
     pad_thickness: Length | None = None
-    """Thickness of the press pad; by default the thinnest sold that gives films 1.5 times the
+    """Thickness of the press pad; by default the thinnest stock pad that gives films 1.5 times the
     pressure."""
     pad_hardness: float = Field(default=10.0, ge=5, le=90)
     """Shore A; 10 is a soft closed-cell silicone sponge, between grades 3 and 4 of ASTM D1056 class
@@ -410,9 +410,9 @@ class Press(Section):
     minutes_for: tuple[Annotated[str, Field(max_length=120), AfterValidator(_named_film)], ...] = (
         Field(default=(PAPER_FILM,), max_length=20, strict=False)
     )
-    """Films that the minutes above were stated for, each as "product, thickness". A laminate of any
-    other structural film gets no minutes: blanks on the traveller, null in press.json. Of a kit
-    that names another film than the paper's, minutes that it leaves out are not known either."""
+    """Films for which the minutes above are stated, each as "product, thickness". A laminate of any
+    other structural film gets no minutes: blanks on the traveller, null in press.json. If a kit
+    names a film other than the paper's, minutes that it omits are unknown."""
     time_constant: TimeConstant = NOT_MEASURED
     """Minutes in which the edge of the base plate, laid cold between the hot platens under the pad,
     covers 63 % of the temperature difference; measured once at the bench."""
@@ -448,7 +448,7 @@ class Acceptance(Section):
 
     working_pressure_kpa: float | None = Field(default=None, ge=-101.325, le=10000)
     """Highest working gauge pressure; a vacuum is negative. By default none is stated, and the rule
-    pressure-rating warns if the actuator is not fit for 100 kPa, at which the paper gives
+    pressure-rating warns if the actuator is unsuitable for 100 kPa, at which the paper gives
     forces."""
     safety_factor: float = Field(default=2.0, ge=1, le=100)
     """Ratio of the estimated burst pressure to the highest working pressure. Ours: the estimate
@@ -457,13 +457,13 @@ class Acceptance(Section):
     leak_pressure_kpa: float = Field(default=5.0, gt=0, le=1000)
     """Leak test under water: enough to open every balloon (a stack of d = 5 unfolds up to 0.95)."""
     leak_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """Time for which it is held."""
+    """Duration of the leak test."""
     proof_pressure_kpa: float = Field(default=150.0, gt=0, le=10000)
     """Proof test: 1.5 times the 100 kPa at which the paper gives forces. Lower if 60 % of the
     estimated burst pressure is less. For a film without a burst test these 150 kPa are left blank,
     and any other pressure is printed as stated."""
     proof_seconds: float = Field(default=60.0, gt=0, le=36000)
-    """Time for which it is held."""
+    """Duration of the proof test."""
     fitting: str = Field(default=FITTING, min_length=1, max_length=200)
     """Connector from the tube to a syringe, regulator or gauge."""
 
@@ -476,33 +476,33 @@ class Laser(Section):
     """The laser: its limits, kerf, film fixing, and speeds for estimates."""
 
     least_feature: Length = 0.2
-    """The narrowest slot or web the laser cuts well."""
+    """The narrowest slot or web that the laser cuts reliably."""
     cut_speed: float = Field(default=20.0, gt=0, le=5000)
-    """mm/s; only for estimates of time, not a machine setting."""
+    """mm/s; only for time estimates, not a machine setting."""
     travel_speed: float = Field(default=200.0, gt=0, le=5000)
-    """mm/s between cuts; for estimates of time only."""
+    """mm/s between cuts; only for time estimates."""
     pierce_seconds: float = Field(default=0.1, ge=0, le=60)
-    """Time to begin a contour; for estimates only."""
+    """Time to start a contour; only for estimates."""
     heat_distance: LengthOrZero = 3.0
-    """Parts nearer to each other than this are not cut one right after the other."""
+    """Parts closer to each other than this are not cut consecutively."""
     kerf_tpe: KerfWidth = UNCALIBRATED
     """Full kerf width in TPE, measured, or [along x, along y]; "uncalibrated" writes nominal edges
-    and says so."""
+    and states so."""
     kerf_ptfe: KerfWidth = UNCALIBRATED
     """Full kerf width in PTFE, measured, as laser.kerf_tpe."""
     hold_tpe: HoldDown = "border"
-    """Holding of TPE, and other films that bond, under the beam: its "border" taped to card, a
-    "carrier" sheet of low tack, or a "vacuum" bed. Ours, not tried: adhesive of a carrier that
-    stays in a bond may leak."""
+    """Fixing of TPE, and other films that bond, under the beam: its "border" taped to card, a
+    low-tack "carrier" sheet, or a "vacuum" bed. Ours, untested: carrier adhesive left in a bond may
+    cause a leak."""
     hold_ptfe: HoldDown = "carrier"
-    """Holding of PTFE, and other masks, as laser.hold_tpe. Ours, not tried: masks are light and
-    loose, and nothing bonds to them."""
+    """Fixing of PTFE, and other masks, as in laser.hold_tpe. Ours, untested: masks are light and
+    loose, and do not bond."""
     unknown_kerf: Annotated[float, Millimetres(0, 1)] = 0.1
-    """Allowance in a part's width for a kerf that was not measured: ours."""
+    """Allowance in a part's width for an unmeasured kerf: ours."""
     machine: MachineName | None = None
-    """The machine whose recipes LightBurn's projects use; by default none: every power is 0."""
+    """The machine whose recipes LightBurn's projects use; by default none, so every power is 0."""
     recipe: Annotated[tuple[Recipe, ...], Field(max_length=200, strict=False)] | None = None
-    """Power and speed by film, thickness and machine, a [[laser.recipe]] each."""
+    """Power and speed by film, thickness and machine, one [[laser.recipe]] each."""
 
     @model_validator(mode="after")
     def _recipes_are_one_each(self) -> Self:
@@ -526,10 +526,10 @@ class Sheets(Section):
     """True if name, material, number and design hash are engraved into the border."""
     index_marks: bool | None = None
     """True if the number of its pattern is engraved into the skeleton beside each part with enough
-    room; off by default. Wider spacing leaves more room."""
+    space; off by default. Wider spacing leaves more space."""
     program: Literal["rdworks", "epilog"] | None = None
-    """A laser program, beside LightBurn, that each sheet gets a machine file for: "rdworks" (DXF
-    R12 by colours) or "epilog" (SVG with hairlines by colours)."""
+    """A laser program besides LightBurn for which each sheet gets a machine file: "rdworks" (DXF
+    R12 by colour) or "epilog" (SVG with hairlines by colour)."""
 
 
 class Rules(Section):
@@ -538,7 +538,7 @@ class Rules(Section):
     bond_width: Length = 0.75
     """Every bond must be at least this wide."""
     mask_overhang: Length = 0.5
-    """Every mask must reach at least this far past the edges it keeps apart."""
+    """Every mask must extend at least this far past the edges that it separates."""
     worst_bond_width: LengthOrZero = 0.5
     """Least remaining width of every bond with all errors of cutting and registration at worst."""
     worst_mask_overhang: LengthOrZero = 0.25
@@ -548,8 +548,8 @@ class Rules(Section):
     yield_builds: Annotated[int, Field(ge=100, le=1_000_000)] | None = None
     """Random builds drawn for registration-yield; by default 10,000, fewer for tall stacks."""
     validated_balloons: int = Field(default=20, ge=1, le=1000)
-    """More balloons than this draw a warning (paper Sec. 6), and films that are higher than as many
-    of the paper's, 0.125 mm a balloon."""
+    """More balloons than this draw a warning (paper Sec. 6), as do films with a greater height than
+    so many of the paper's, 0.125 mm per balloon."""
     opening_pressure_kpa: float | None = Field(default=None, gt=0, le=10000)
     """A channel of a net must open at this pressure: one of its films lifts by its thickness. By
     default 100 kPa, at which the paper gives forces."""
@@ -588,8 +588,8 @@ class Models(Section):
     """The basis of predictions."""
 
     calibration: str = Field(default="paper", min_length=1, max_length=1000)
-    """The calibration of the models: "paper", a file beside the design that sbafab calibrate wrote,
-    or "none" for films as drawn and bought, and no intervals."""
+    """The calibration of the models: "paper", a file written by sbafab calibrate beside the design,
+    or "none" for films as drawn and bought, without intervals."""
 
 
 class Stack(Section):

@@ -154,7 +154,7 @@ def property_differences(actual: Mapping[str, str], expected: Mapping[str, str])
 
 
 def _snapped(part: CutPart, designed: Iterable[Contour]) -> CutPart:
-    """Return a part with contours that agree with one of the ``designed`` replaced by it."""
+    """Return a part with each contour that agrees with a ``designed`` one replaced by it."""
     snapped = (
         next((like for like in designed if _agree(contour, like)), contour)
         for contour in part.region.contours

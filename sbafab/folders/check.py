@@ -97,9 +97,9 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     whether all files match the design; with ``nets``, a file, also whether the layers match that
     netlist.
 
-    In a job's folder all designs are checked, and the film sheets they share. Raises OutputError
-    for a folder without a sound manifest or without cut files, and for one inside a job's,
-    DesignError for a netlist that cannot be read, or one of a job.
+    In a job's folder all designs and their shared film sheets are checked. Raises OutputError for a
+    folder without a valid manifest or without cut files, DesignError for an unreadable netlist, or
+    one of a job.
     """
     netlist = None if nets is None else read_netlist(nets)
     index = read_index(folder)
@@ -338,8 +338,10 @@ def _by_hashes(
 def _remade_problems(
     folder: Path, index: Manifest | JobManifest, order: Order
 ) -> tuple[list[Finding], set[str]]:
-    """Return the files of a folder that differ from those made again, and those that were saved
-    anew and are equal; differences of layers were told when they were read.
+    """Return the files of a folder that differ from regenerated ones, and equal files that were
+    saved again.
+
+    Differences of layers were reported before.
     """
     if index.generator != GENERATOR:
         message = (
@@ -360,7 +362,10 @@ def _remade_problems(
 
 
 def _remake(folder: Path, index: Manifest | JobManifest, order: Order, fresh: Path) -> None:
-    """Write the files of a run to ``fresh``, its manifest without hashes."""
+    """Write the files of a run to ``fresh``, its manifest without hashes.
+
+    A design of a job has no film sheets and no pages in its own folder.
+    """
     parts = {*EVERYTHING}
     if isinstance(index, Manifest):
         parts = _parts(index.files)
@@ -401,7 +406,10 @@ def _foreign_problems(index: Manifest | JobManifest, remade: Collection[str]) ->
 def _compared(
     folder: Path, fresh: Path, index: Manifest | JobManifest
 ) -> tuple[list[Finding], set[str]]:
-    """Return the files that differ from those made again, and those that were saved anew."""
+    """Return the files that differ from regenerated ones, and those that were saved again.
+
+    Differences of the files in ``layers`` were reported when they were read.
+    """
     problems: list[Finding] = []
     equal: set[str] = set()
     bare: list[str] = []
@@ -435,7 +443,7 @@ def _compared(
 
 
 def _index_difference(folder: Path, fresh: Path, name: str) -> str:
-    """Return the first difference of a manifest from the one made again; "" if none."""
+    """Return the first difference of a manifest from the regenerated one; "" if there is none."""
     actual, expected = (
         json.loads((root / name).read_text(encoding="utf-8")) for root in (folder, fresh)
     )

@@ -425,7 +425,7 @@ class Arrangement:
                 raise InconsistentError(self._drawn[half >> 1].at(0.5))
 
     def _beside(self, half: int) -> Point | None:
-        """A point to the left of a half, nearer to it than to any other; None without room."""
+        """A point to the left of a half, nearer to it than to any other half; None without room."""
         edge = self._drawn[half >> 1]
         x, y = edge.at(0.5)
         room = reach = edge.length / 16

@@ -15,8 +15,8 @@ CELL = 16.0
 
 
 class LooseEndError(ArithmeticError):
-    """An end that does not meet exactly one other: its place, how many ends lie there, and how far
-    the next loose end is, mm.
+    """An end that does not meet exactly one other: its place, the number of ends there, and the
+    distance to the next loose end, mm.
     """
 
     def __init__(self, place: Point, ends: int, gap: float = 0.0) -> None:

@@ -181,8 +181,10 @@ class Component(NamedTuple):
 
 
 class Circuit:
-    """A placed and routed circuit. ``titles`` of layers by id, bottom to top; ``channels`` as
-    layer, points and width, um; ``remarks`` on parts that are not imported as drawn.
+    """A placed and routed circuit.
+
+    ``titles`` of layers by id, bottom to top; ``channels`` as layer, points and width, um;
+    ``remarks`` about items that are not imported as drawn.
     """
 
     def __init__(self, document: Mapping[str, Any], stem: str) -> None:
@@ -282,8 +284,10 @@ class Circuit:
         return round(x, 6) + 0.0, round(y, 6) + 0.0
 
     def mask(self, layer: str) -> Region:
-        """Return the channels and components of a layer. Raises DesignError if contours touch at a
-        single point, since it is ambiguous whether they connect.
+        """Return the channels and components of a layer.
+
+        Raises DesignError if contours touch at a single point, since it is ambiguous whether they
+        connect.
         """
         parts = [self._outline(c) for c in self.components.values() if layer in c.layers]
         parts += [self._channel(r, width) for on, r, width in self.channels if on == layer]

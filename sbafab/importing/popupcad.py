@@ -256,7 +256,7 @@ Sketch = list[tuple[str, CadRecord]]
 class CadDesign:
     """A design: layers bottom to top with their material, operations in order with their places.
 
-    ``remarks`` name the interpreted parts.
+    ``remarks`` list interpretations.
     """
 
     def __init__(self, root: CadRecord, place: str, depth: int = 0) -> None:
@@ -570,8 +570,8 @@ def cad_layer(path: Path, layer: str) -> tuple[Region, list[str]]:
     touch = crossing(flat.region.edges)
     if touch is not None:
         raise DesignError(
-            f"{where} has contours that touch at x {touch[0]:.4f}, y {touch[1]:.4f}; draw them "
-            "apart there, or join them"
+            f"{where} has contours that touch at x {touch[0]:.4f}, y {touch[1]:.4f}; separate them "
+            "there, or join them"
         )
     thickness = film.get("thickness")
     thick = f", {thickness:g} mm" if isinstance(thickness, int | float) else ""

@@ -34,8 +34,8 @@ MOST_NAMED = 20
 class Imported:
     """A design of drawn layers as ``tables`` of its file, and the content of its ``drawings``.
 
-    Shapes, kit and calibration name a drawing by its key. ``remarks`` name, by place, omissions,
-    and how ambiguous input was read.
+    Shapes, kit and calibration name a drawing by its key. ``remarks`` list, by place, items that
+    were not imported and the interpretation of ambiguous input.
     """
 
     tables: Mapping[str, Any]

@@ -53,8 +53,8 @@ def import_to(
 ) -> tuple[str, tuple[str, ...], Written]:
     """Write a source as a design into ``file``, by default into ``folder`` under its own name.
 
-    Return the format, remarks on omissions, and the design. Raises DesignError and
-    OutputError.
+    Return the format, remarks about items that are not imported, and the design. Raises DesignError
+    and OutputError.
     """
     name, imported = import_source(source)
     file = file or folder / f"{imported.tables['name']}.toml"

@@ -149,7 +149,7 @@ class Balloon:
 
     @cached_property
     def may_wrinkle(self) -> NDArray[np.bool_]:
-        """True for the elements that may wrinkle: in the film, not in neck and rim."""
+        """True for elements that may wrinkle: in the film, outside neck and rim."""
         beyond = np.arange(len(self.nodes) - 1) >= self.edge
         return (self.is_free & self.wrinkles) | (beyond & self.inextensible)
 
@@ -428,14 +428,14 @@ def relative_change(x: Array, ahead: Array) -> Array:
 
 
 def compressed_length(balloon: Balloon, x: Array) -> Array:
-    """Return the length in mm along the film over which the smooth hoop is compressed."""
+    """The length in mm of the film over which a smooth film is compressed in the hoop direction."""
     meridian, hoop = strain(balloon, Elements.of(x))
     is_compressed, lengths = hoop + balloon.poisson * meridian < 0, balloon.lengths
     return np.asarray(np.maximum((lengths * balloon.may_wrinkle) @ is_compressed, lengths.min()))
 
 
 def wrinkle_stress(balloon: Balloon, x: Array, zone: Array) -> Array:
-    """Return the hoop stress in kPa that wrinkles over a zone carry, by each element's tension."""
+    """The hoop stress in kPa carried by wrinkles over a zone, from each element's tension."""
     at = Elements.of(x)
     tension = balloon.membrane_stiffness * strain(balloon, at)[0]
     # A wrinkle in a curved film stretches the meridian: a large number of short ones costs least.
@@ -446,7 +446,7 @@ def wrinkle_stress(balloon: Balloon, x: Array, zone: Array) -> Array:
 
 
 def ripples_at(films: Sequence[Balloon], shapes: Sequence[Array]) -> list[Ripple]:
-    """Return the rim's ripples at coordinates of one film, mirrored by the other, or of both."""
+    """Return the rim's ripples at coordinates of one film (mirrored by the other), or of both."""
     strains = [strain(film, Elements.of(x)) for film, x in zip(films, shapes, strict=True)]
     edge = films[0].edge
     pulls = [

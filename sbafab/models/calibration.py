@@ -430,9 +430,11 @@ class Uncertainty:
         return 1.0 if self.measured is None else math.exp(self.measured[0][GROUPS.index(group)])
 
     def rates(self, group: str, slopes: Sequence[float], size: float = 1.0) -> Array:
-        """Return the rates (n + groups,) of a quantity of a group with these ``slopes`` by the
-        coordinates; left-out ones at the end are 0. ``size`` is the rate by what the group misses:
-        1 for a logarithm, the value for a value.
+        """Return the derivatives (n + groups,) of a quantity of a group with these ``slopes`` in
+        the coordinates; omitted ones at the end are 0.
+
+        ``size`` is the derivative with respect to the group's model error: 1 for a logarithm, the
+        value for a value.
         """
         rates = np.zeros(len(UNKNOWNS) + len(GROUPS))
         rates[: len(slopes)] = slopes
@@ -440,8 +442,8 @@ class Uncertainty:
         return rates
 
     def own_miss(self, group: str) -> float:
-        """Return the relative standard deviation that the models miss of one value of a group for
-        itself, off the evidence too.
+        """Return the relative standard deviation of the model error specific to one value of a
+        group; ``farther`` is assumed outside the evidence.
         """
         missed = math.sqrt(1 - SHARED) * self.calibration.discrepancy[group]
         return math.hypot(missed, self.farther(group))
@@ -466,10 +468,10 @@ class Uncertainty:
         return value - half, value + half
 
     def conditioned(self, rates: Array, missed: Array, own: Array) -> Uncertainty:
-        """Return what is known of an actuator by values that were measured on it: the logarithms
+        """Return the calibration conditioned on values measured on an actuator: the logarithms
         ``missed`` (m,) of measured over predicted ones, their ``rates`` (m, n + groups), and the
-        standard deviations ``own`` (m,) of each for itself, by models and measurement. The normal
-        posterior of a linear model.
+        standard deviations ``own`` (m,) specific to each, from models and measurement. It is the
+        posterior of a linear normal model.
         """
         gain = np.linalg.solve(rates @ self.joint @ rates.T + np.diag(own**2), rates @ self.joint).T
         change, joint, count = gain @ missed, self.joint - gain @ rates @ self.joint, len(UNKNOWNS)

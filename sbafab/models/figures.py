@@ -309,10 +309,10 @@ class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul per balloon, and factors.
 
-    Without ``calibration`` the factors come from the design's calibration, with ``tip_load`` g on
-    the free tip. Intervals hold a measurement with this ``probability`` (a share). If one figure is
-    ``wanted``, others are left out that cost time. What was ``measured`` on an actuator narrows the
-    prediction to that one.
+    Without ``calibration`` the factors come from the design's calibration, replaced by the user's
+    values (``overrides``, by field of ``Factors``) where given. Intervals contain a measurement
+    with this ``probability``. If one figure is ``wanted``, other slow ones are omitted. Values
+    ``measured`` on an actuator narrow the prediction to that actuator.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES
@@ -349,8 +349,9 @@ class PredictionRequest:
 
 @dataclass(frozen=True, repr=False)
 class Prediction:
-    """The prediction of one design; if it is that of an actuator on which values were measured,
-    ``before`` has the figures without these. ``curves`` computes its relations.
+    """The prediction for one design.
+
+    For an actuator with measured values, ``before`` has the figures without these.
     """
 
     asked: PredictionRequest

@@ -73,7 +73,7 @@ def reached(
 
 class Search:
     """The ``best`` poses of a column under a load for places (n, 3), with coordinates of pressures
-    up to ``most``; how far ``away`` (n) their tips count in mm, and where the search is over.
+    up to ``most``; the distance ``away`` (n) of their tips in mm, and whether the search is over.
     """
 
     def __init__(self, column: Column, load: Load | None, places: Array, most: float) -> None:
@@ -262,7 +262,7 @@ class Search:
 
 
 def further_starts(guess: Array, most: float) -> list[Array]:
-    """Return starts all over the range, the nearer to the middle the earlier: (n, chambers)."""
+    """Return starts over the whole range, those nearer to the middle first: (n, chambers)."""
     shares = [np.full(guess.shape[-1], share) for share in (0.6, 0.85, 0.3, 0.1)]
     for one in np.eye(guess.shape[-1]):
         shares += [0.3 + 0.6 * one, 0.9 - 0.6 * one]

@@ -143,7 +143,7 @@ class Counterpart:
 
     @property
     def sentence(self) -> str:
-        """The clause that stands in parentheses beside a figure."""
+        """The clause in parentheses beside a figure."""
         at = f" {self.where}" if self.where else ""
         return (
             f"the paper measured {self.measured} {self.state} on its {self.actuator}; "

@@ -270,8 +270,8 @@ def _check_request(actuator: Actuator, request: PredictionRequest) -> None:
 
 
 def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
-    """Return the paper's measurement if the figure is far off; None for a folded height with a
-    press factor.
+    """Return the paper's measurement if the figure deviates far; None for a folded height with a
+    factor.
     """
     model, form = figure.model, actuator.form
     if model.id is ModelId.FILMS and model.press_factor != 1:

@@ -72,7 +72,7 @@ def sensitivity_table(design: Design, pressure: float) -> list[SensitivityRow]:
 def _ends(
     design: Design, key: str, value: float, whole: Stack, pressure: float, factors: Factors
 ) -> tuple[float, list[Stack]]:
-    """Return the step of a key, and the stacks with a step less and more of it."""
+    """Return the step of a key, and the stacks one step below and above."""
     if key.endswith(".modulus") and _is_film_of_all(design, key):
         # Maps of softer films end at less pressure.
         sides = (-1, 1) if pressure * (1 + EXACT_SHARE) < whole.most_pressure else (0, 2)
@@ -110,6 +110,6 @@ def _value(design: Design, key: str) -> int | float:
 
 
 def _is_film_of_all(design: Design, key: str) -> bool:
-    """Return True if a key is the modulus of all films that are bonded."""
+    """Return True if a key is the modulus of all bonded films."""
     films = {layer.film for layer in build(design).layers if not layer.is_mask}
     return films == {design.films.stock[key.split(".")[1]]}

@@ -317,7 +317,7 @@ def pins_by_step(laminate: Laminate, design: Design) -> tuple[list[tuple[PinSett
 
 
 def plate_holes(laminate: Laminate, design: Design) -> dict[str, PinHole]:
-    """Return the base plate's hole of every pin that some step uses, by the pin's name."""
+    """Return the base plate's hole for every pin in use, by the pin's name."""
     return pin_holes(pins_by_step(laminate, design)[0])
 
 

@@ -110,7 +110,7 @@ class AssemblyPrediction:
     near_burst: tuple[str, ...]
 
     def met(self) -> list[str]:
-        """Sentences on contacts of inflated parts, and remedies."""
+        """Sentences about contacts of inflated parts, and remedies."""
         sentences = [
             f"{touch.part} and {touch.other} meet when inflated: they share "
             f"{touch.volume:.2f} mm3; move them apart, or give less pressure"

@@ -419,6 +419,7 @@ def seams_pdf(
     laminate: Laminate, design_sha256: str, offsets: Mapping[str, Point] | None = None
 ) -> bytes | None:
     """Return pages of seam paths at 1:1, one for all seams of the same films; None without a seam.
+
     Paths are at the seams, even for tools with ``offsets``, which a line of text states.
     """
     steps: dict[tuple[int, ...], dict[int, Seam]] = {}

@@ -54,9 +54,9 @@ class YieldDesign:
     """A design for a yield: ``design`` is ``given`` with the ``changes``, None if no change reaches
     the share ``target``, and the given one if that suffices.
 
-    ``changes`` are keys with their old and new value. ``share`` is counted on the changed design by
-    another seed, or on the given one if that is enough; None if that fails other rules. If no
-    change is enough, both are of the best that was reached. ``fixed``: keys that were not changed
+    ``changes`` are keys with their old and new value. ``share`` is counted with another seed
+    on the changed design, or on the given one if it suffices; None if that fails other rules. If no
+    change suffices, both describe the best design reached. ``fixed``: keys that were not changed
     although a change might have helped.
     """
 
@@ -213,7 +213,7 @@ class _Trials:
         return share is not None and share.interval[0] >= self.target
 
     def broken(self, way: Way, steps: Steps) -> set[str]:
-        """Return the rules that the design fails, but for the one that limits the yield."""
+        """Return the rules that the design fails, except the one that limits the yield."""
         design = self.changed(way, steps)
         rules = design.rules.model_copy(update={"target_yield": None})
         findings = run_deck(build(design), design.model_copy(update={"rules": rules}))
@@ -242,7 +242,7 @@ def _smallest(trials: _Trials, way: Way, most: int) -> Steps | None:
     """
 
     def is_short(bond: int, overhang: int) -> bool:
-        """Return True if the design can be built and does not reach the target."""
+        """Return True if the design can be built but does not reach the target."""
         steps = bond, overhang
         return trials.share(way, steps) is not None and not trials.is_enough(way, steps)
 

@@ -65,8 +65,7 @@ LITTLE = 0.005
 class Table:
     """Rows of a sweep, read again for each pass, so that only the disk limits their number.
 
-    ``values`` are of the varied keys, a set for each row; ``limited`` are labels of the quantities
-    that have limits, which stand among the rules.
+    Files get the most important columns, or all of them with ``is_whole``.
     """
 
     rows: Callable[[], Iterator[SweepRow]]

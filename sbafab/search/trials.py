@@ -169,7 +169,7 @@ def fingerprint() -> str:
 
 
 def main() -> None:
-    """Measures until standard input ends."""
+    """Measure designs until standard input ends."""
     # Ctrl-C goes to all processes of a terminal; the parent ends this one.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     prepare()

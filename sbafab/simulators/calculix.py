@@ -71,11 +71,11 @@ TPE = Elastic(*PAPER_TPE, 1.122e-9)
 class DeckSettings:
     """Load and procedure.
 
-    ``pressures`` in kPa by chamber are reached after ``ramp`` seconds, with ``outputs`` results on
-    the way. They rise with the square of time, because a flat film yields quickly at first and then
-    less and less. Films start ``imperfection`` mm off flat, since Newton's iteration cannot pass
-    wrinkling as a bifurcation. "static" omits the inertia that carries a film from one wrinkle
-    pattern to the next, and usually stops there. ``films`` are given by material.
+    ``pressures`` in kPa by chamber are reached after ``ramp`` seconds, with ``outputs``
+    intermediate results. They rise with the square of time, because a flat film is compliant at
+    first and stiffens. Films start ``imperfection`` mm off flat, since Newton's iteration cannot
+    pass the bifurcation of wrinkling. "static" omits the inertia that carries a film from one
+    wrinkle pattern to the next, and usually stops there. ``films`` are given by material.
     """
 
     pressures: Mapping[str, float]
@@ -99,7 +99,7 @@ class DeckSettings:
 
     @property
     def largest(self) -> float:
-        """The pressure in kPa that is farthest from 0."""
+        """The pressure in kPa with the largest magnitude."""
         return max(self.pressures.values(), key=abs)
 
     @property
@@ -110,7 +110,7 @@ class DeckSettings:
 def deck_settings(
     laminate: Laminate, request: SimulationRequest | None = None, procedure: Procedure = "dynamic"
 ) -> DeckSettings:
-    """Settings for a laminate; pressures as in ``chamber_pressures``, the paper's by default."""
+    """Settings for a laminate; pressures as in ``chamber_pressures``, by default the paper's."""
     names = [chamber.name for chamber in laminate.chambers]
     pressures = chamber_pressures(
         names, request or SimulationRequest(), PAPER_PRESSURE, least=-LARGEST_VACUUM
@@ -134,9 +134,9 @@ WAVES = tuple((0.2 + 0.52 * n, (1.0, 1.7, 2.9)[n % 3], 2.4 * n**2) for n in rang
 
 
 def uneven(points: Floats, height: float) -> Floats:
-    """Points (n, 3) of a stack laid on a wavy plate, up to ``height`` mm up or down.
+    """Return points (n, 3) of a stack laid on a wavy plate, up to ``height`` mm up or down.
 
-    Films and bonds above each other move together: their thicknesses and gaps do not change.
+    Films and bonds above each other move together, so their thicknesses and gaps do not change.
     """
     x, y = points[:, 0], points[:, 1]
     waves = np.zeros(len(points))
@@ -159,12 +159,12 @@ FLAT = 1e-6
 
 
 def supports(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
-    """The node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
+    """Return the node set ``held``, and lines of ``*BOUNDARY`` and ``*EQUATION``.
 
     A stack stands on its base. A lone balloon bulges both ways, and its ring may ripple, as in the
     paper's model: only the ring of its two films can hold it, of which a few nodes prevent
-    rigid-body motion. The same applies if the deck ``is_free``. If it ``is_glued``, inlets are shut
-    by their tubes.
+    rigid-body motion. The same applies if the deck ``is_free``. If it ``is_glued``, inlets are
+    closed by their tubes.
     """
     is_lone = sum(name.startswith("film_") for name in mesh.cell_sets) == 2
     is_free = settings.is_free or is_lone
@@ -182,7 +182,7 @@ def supports(mesh: Mesh, settings: DeckSettings) -> Iterator[str]:
 
 
 def _glued_lips(mesh: Mesh) -> Iterator[str]:
-    """Tie both lips of a mouth together, as a tube is glued in between them.
+    """Tie both lips of a mouth together, as for a tube glued between them.
 
     This closes the chamber: otherwise the air in an opening mouth would push the films off.
     """
@@ -229,7 +229,7 @@ def _fixed_freedoms(mesh: Mesh) -> Iterator[tuple[int, int]]:
 
 
 def _on_plane(mesh: Mesh, name: str, is_free: bool) -> Iterator[str]:
-    """The nodes of one symmetry plane stay on it."""
+    """Keep the nodes of one symmetry plane on it."""
     nodes = mesh.node_sets[name]
     places = mesh.points[nodes, :2]
     # The unit normal of the upright plane through the axis and these points.
@@ -264,8 +264,8 @@ ABAQUS_FILE = "abaqus.inp"
 def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
     """Write ``actuator.inp``, ``abaqus.inp`` and the ``mesh.inp`` they include into ``folder``.
 
-    ``mesh`` is a flat volume mesh. Return the files; run them with ``ccx -i actuator`` or
-    ``abaqus job=abaqus``. The latter follows Abaqus's manual and has never been run.
+    ``mesh`` is a flat volume mesh. Return the files; run them with ``ccx -i actuator`` or ``abaqus
+    job=abaqus``. The latter follows Abaqus's manual and is untested.
     """
     folder.mkdir(parents=True, exist_ok=True)
     run_mesh = started(mesh, settings)
@@ -283,19 +283,19 @@ def write_deck(mesh: Mesh, settings: DeckSettings, folder: Path) -> list[Path]:
 
 
 def started(mesh: Mesh, settings: DeckSettings) -> Mesh:
-    """The mesh to run: the flat one with its imperfection."""
+    """Return the mesh to run: the flat mesh with its imperfection."""
     return replace(mesh, points=uneven(mesh.points, settings.imperfection))
 
 
 def _films(mesh: Mesh, settings: DeckSettings) -> Iterator[tuple[str, Elastic, list[str]]]:
-    """The name of each film, its material, and the parts of the mesh that are of it."""
+    """Return the name of each film, its material, and its parts of the mesh."""
     for name in in_order(mesh.materials.values()):
         parts = [part for part, of in mesh.materials.items() if of == name]
         yield name, settings.films[name], parts
 
 
 def _cavity_faces(mesh: Mesh) -> Iterator[tuple[str, int, list[int]]]:
-    """Chamber, number of an element's face, and the elements with air on it, all from 1."""
+    """Yield chamber, number of an element's face, and the elements with air on it, all from 1."""
     for name, faces in mesh.face_sets.items():
         for number in np.unique(faces[:, 1]).tolist():
             cells = faces[faces[:, 1] == number, 0] + 1

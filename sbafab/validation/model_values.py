@@ -212,10 +212,7 @@ def _tried(value: Callable[..., float], *at: float) -> ModelValue:
 
 
 def _by_pressure(curve: MeasuredCurve, value: Callable[[float], float]) -> Series:
-    """Return a value at each pressure of a curve, by the assumption on the pressure.
-
-    OPEN_PRESSURES are assumed if neither axis nor set-up gives a pressure.
-    """
+    """Return a value at each pressure of a curve, by the assumption about the pressure."""
     reached, pressures = partial(_tried, value), curve.at("pressure_kpa")
     if pressures is not None:
         return {"": tuple(map(reached, pressures))}

@@ -191,8 +191,9 @@ class PaperTable:
         )
 
     def write(self, folder: Path) -> None:
-        """Write ``reproduction.md``, ``reproduction.json`` and charts into a folder. Raises
-        OutputError if it cannot be written.
+        """Write ``reproduction.md``, ``reproduction.json`` and charts into a folder.
+
+        Raises OutputError if it cannot be written.
         """
         files = {
             "reproduction.md": self.page(),

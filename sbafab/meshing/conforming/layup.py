@@ -192,9 +192,11 @@ class MeshedVoid(NamedTuple):
 
 @dataclass(frozen=True)
 class Layup:
-    """Data shared by the meshes of one laminate. ``seats`` are the triangles on the channels' axes
-    that hold base and tip: the neck ring with the bore inside it. ``shares`` are the meshed
-    fractions of the chambers. Without ``is_thick`` films are represented by their mid-surfaces.
+    """Data shared by the meshes of one laminate.
+
+    ``seats`` are the triangles on the channels' axes that hold base and tip: the neck ring with the
+    bore inside it. ``shares`` are the meshed fractions of the chambers. Without ``is_thick`` films
+    are represented by their mid-surfaces.
     """
 
     laminate: Laminate
@@ -371,8 +373,10 @@ def _check_apart(plane: Plane, ply: Ply) -> None:
 
 class FormedFilm(NamedTuple):
     """Lower face of a film over the plane's nodes, ``base`` (n, 3) mm, and the unit vectors ``up``
-    (n, 3) of its thickness. ``growth`` is the relative increase of its volume over the flat film's,
-    if it is bent around a tube.
+    (n, 3) of its thickness.
+
+    ``growth`` is the relative increase of its volume over the flat film's, if it is bent around a
+    tube.
     """
 
     base: Floats

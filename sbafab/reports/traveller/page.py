@@ -345,8 +345,9 @@ class Proof(NamedTuple):
 
 def proof(work: Work) -> Proof:
     """Return the pressure of the proof test: the kit's, or less for an actuator that would burst
-    near it. A film without a burst test takes the stated value of the kit or design, not the
-    default.
+    near it.
+
+    A film without a burst test takes the stated value of the kit or design, not the default.
     """
     stated = work.design.acceptance.proof_pressure_kpa
     estimate = burst(work.laminate)
