@@ -83,7 +83,7 @@ def test_a_bar_tells_the_scale(coupon: Path, tmp_path: Path, run: Run) -> None:
         # Read as a sheet without its pieces, the film seems larger than drawn.
         ("scan.png", ["--paper", "light"], ""),
         ("scan.png", ["--pins"], "--pins needs 2 pins"),
-        ("scan.png", ["--bar", "55"], "no bar about that long"),
+        ("scan.png", ["--bar", "55"], "no bar of about that length"),
         ("scan.png", ["--bar", "-1"], "must be a length above 0 mm"),
         ("dark.png", [], "film and paper differ by"),
         ("tiny.png", [], "too small to measure"),

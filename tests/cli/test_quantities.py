@@ -42,5 +42,5 @@ def test_a_chamber_is_named_where_not_all_are_meant() -> None:
         with pytest.raises(click.BadParameter, match="chamber1=5"):
             one.convert(written, option, context)
     assert by_chamber(context, option, (("a", 1.0), ("b", 2.0))) == {"a": 1.0, "b": 2.0}
-    with pytest.raises(click.BadParameter, match="given once"):
+    with pytest.raises(click.BadParameter, match="only once"):
         by_chamber(context, option, (("a", 1.0), ("a", 2.0)))

@@ -94,13 +94,13 @@ def test_a_failing_design_stops_the_whole_job(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("own", "name", "said"),
     [
-        ("sheets", "batch", "a design is named sheets, as the job's folder of film sheets is"),
-        ("SHEETS", "batch", "a design is named SHEETS, as the job's folder of film sheets is"),
-        ("manifest.json", "batch", "a design is named manifest.json, as the job's index is"),
+        ("sheets", "batch", "a design is named sheets, like the job's folder of film sheets"),
+        ("SHEETS", "batch", "a design is named SHEETS, like the job's folder of film sheets"),
+        ("manifest.json", "batch", "a design is named manifest.json, like the job's index"),
         (
             "1DOF-5mm",
             "batch",
-            "two designs are named 1dof-5mm and 1DOF-5mm, which is the same folder",
+            "two designs are named 1dof-5mm and 1DOF-5mm, which is one folder",
         ),
         (
             "other",

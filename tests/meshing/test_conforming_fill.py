@@ -74,7 +74,7 @@ def test_cavities_hold_what_was_asked(template: str, changes: tuple[str, ...], f
 @pytest.mark.parametrize(
     ("fill", "message"),
     [
-        (17.0, r"ask for 16\.94 ul at most"),
+        (17.0, r"use at most 16\.94 ul"),
         (-1.0, "must be 0 ul or more"),
         (math.nan, "must be 0 ul or more"),
     ],

@@ -79,7 +79,9 @@ def test_chambers_of_unlike_pockets_are_not_filled() -> None:
         for pocket in pockets(stack)
     ]
     fills = {chamber.name: 3.0 for chamber in stack.laminate.chambers}
-    with pytest.raises(DesignError, match=r"lifts the chambers 0\.\d+ mm apart"):
+    with pytest.raises(
+        DesignError, match=r"lifts the chambers by heights that differ by 0\.\d+ mm"
+    ):
         filled(stack, fills, unlike)
 
 

@@ -102,10 +102,10 @@ def test_base_tip_and_inlet_are_where_they_belong(meshes: ConformingMeshes) -> N
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        (MeshSettings(h=0.8), "ask for 0.750 mm at most"),
+        (MeshSettings(h=0.8), "use at most 0.750 mm"),
         (MeshSettings(h=0.0), "not a valid mesh size"),
         (MeshSettings(h=0.002), "more than 3,000,000"),
-        (MeshSettings(h=0.5, symmetry="sector"), "symmetry sector is not"),
+        (MeshSettings(h=0.5, symmetry="sector"), "lacks the mesh symmetry sector"),
     ],
 )
 def test_what_cannot_be_meshed_is_refused(

@@ -87,7 +87,7 @@ def test_faulty_surfaces_are_found_with_the_place() -> None:
     with pytest.raises(OutputError, match=r"x 1\.000, y 1\.000, z 0\.500"):
         closed_surface("the solid", touching, 0.002)
     twice = [Slab(disc((0, 0), 1.0), 0.0, 1.0)] * 2
-    with pytest.raises(OutputError, match=r"the solid holds 3\.1416 mm3 .* 6\.2832 mm3"):
+    with pytest.raises(OutputError, match=r"the solid holds 3\.1416 mm3.* 6\.2832 mm3"):
         closed_surface("the solid", twice, 0.002)
 
 

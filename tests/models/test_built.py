@@ -64,7 +64,7 @@ def test_a_value_as_predicted_moves_nothing_and_narrows(before: Prediction) -> N
         ("stroke@10kPa=two", "'two'"),
         ("strok@10kPa=16mm", "'strok@10kPa'"),
         ("width=20mm", "no calibrated model predicts the width"),
-        ("chamber.diameter=5", "is of the drawing"),
+        ("chamber.diameter=5", "is a property of the drawing"),
         (
             "height@10kPa=30mm",
             "standard deviations above the",

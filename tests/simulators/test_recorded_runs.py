@@ -93,8 +93,8 @@ def test_trouble_in_the_log_voids_a_run_that_ended_with_0(
 @pytest.mark.parametrize(
     ("last", "words"),
     [
-        ("write(0.2, 0)", "its result cannot be: the tip lies at 0, 0, 0"),
-        ("write(0.2, 0.005)", "its result cannot be: .*the tip has not risen"),
+        ("write(0.2, 0)", "its result is impossible: the tip lies at 0, 0, 0"),
+        ("write(0.2, 0.005)", "its result is impossible: .*the tip has not risen"),
         ("write(0.2, 7)", r"7\.000 mm high, and the films reach 6\.5 mm at most"),
         ("write(0.2, 2, 0.05)", r"the tip leans by 2\.9 degrees \(more than 1\)"),
         ("write(0.2, math.nan)", "not finite from there on; the tip is known to 0.1 s"),

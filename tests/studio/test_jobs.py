@@ -155,9 +155,9 @@ def test_a_design_names_no_file_outside_the_folder(tmp_path: Path, line: str) ->
 @pytest.mark.parametrize(
     ("key", "named", "said"),
     [
-        ("kit", "a" * 300, "neither a kit that ships"),
-        ("kit", "a" * 300 + ".toml", "neither a kit that ships"),
-        ("kit", "a/" * 400 + "b.toml", "neither a kit that ships"),
+        ("kit", "a" * 300, "neither a bundled kit"),
+        ("kit", "a" * 300 + ".toml", "neither a bundled kit"),
+        ("kit", "a/" * 400 + "b.toml", "neither a bundled kit"),
         ("chamber.outline", "a" * 300 + ".svg", "does not exist as a file"),
         ("kit", "latin.toml", "latin.toml is not a text file in UTF-8"),
     ],

@@ -196,7 +196,7 @@ def test_a_grip_in_its_lumen_touches_the_wall_and_free_is_as_wide_as_the_paper_s
     across = np.hypot(free[1].points[:, 0], free[1].points[:, 1])
     assert 2 * across.max() == pytest.approx(held.free, abs=1e-6)
     assert api.grip(brace, "arm") is None
-    with pytest.raises(DesignError, match="there are tube, grip, arm"):
+    with pytest.raises(DesignError, match="use tube, grip, arm"):
         api.grip(brace, "hand")
 
 

@@ -139,7 +139,7 @@ def test_an_interval_by_a_closed_form(paper: ModelCalibration) -> None:
         ({"mean": [1.0]}, "has a mean of 1 numbers; it must be 7"),
         ({"covariance": [[1.0] * 7] * 7}, "covariance that is not symmetric and positive definite"),
         ({"discrepancy": {"force": -1}}, "discrepancy.force = -1"),
-        ({"unknowns": ["modulus_ratio"]}, "other unknowns than"),
+        ({"unknowns": ["modulus_ratio"]}, "must have the unknowns"),
         # Its press factor is that of whole laminates.
         ({"schema": "sbafab/calibration@1"}, "schema = 'sbafab/calibration@1' must be"),
         # Its forces in bending miss as much as axial ones do.
