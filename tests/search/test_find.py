@@ -528,7 +528,7 @@ def test_the_reason_that_holds_for_most_is_given_and_not_that_of_the_smallest() 
     """Pockets of 2.5 mm are too small for the model; the other four stretch by over 15 %."""
     free = ["chamber.diameter=2.5:5.1:0.65", "stack.balloons=6:6:1"]
     drawn = {"models.calibration": "none"}
-    with pytest.raises(DesignError, match=r"stretch.*\(4 of 5 candidates\)"):
+    with pytest.raises(DesignError, match=r"stretch.*\(4 of the 5 tried\)"):
         sbafab.find("1dof-5mm", drawn, least={"stroke@340kPa": 4}, free=free, best="width")
 
 

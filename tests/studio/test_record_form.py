@@ -99,7 +99,7 @@ def test_lines_are_stored_with_their_photograph(client: Client, folder: Path) ->
         ({"design": "../two.toml", "entries": [{}]}, "is not a design file"),
         (
             {"design": "two.toml", "entries": [{"serial": "A1", "photograph": "/etc/passwd"}]},
-            "did not arrive whole",
+            "arrived incomplete",
         ),
         (
             {"design": "two.toml", "entries": [{"serial": "A1", "photograph": "YWJj"}]},
