@@ -20,12 +20,12 @@ GROUPS = {
         "new": "Write a commented design file to start from, or list the templates.",
         "import": "Write a design of drawn layers from other files.",
         "studio": "Edit a design in the browser.",
-        "schema": "Print a JSON schema, by default of design files.",
+        "schema": "Print a JSON schema, by default that of design files.",
     },
     "Check": {
         "check": "Run the rules on a design or on an output folder.",
         "explain": "Explain a rule, a key of design files, a quantity, or a flag of figures.",
-        "compare": "Compare two designs: what differs, what each reaches.",
+        "compare": "Compare two designs: their differences and figures.",
     },
     "Make": {
         "generate": "Write everything: cut files, schedule, traveller, meshes.",

@@ -48,7 +48,7 @@ def test_curves_that_no_design_describes_are_not_fitted(run: Run) -> None:
     Path("bench.csv").write_text("quantity,y\nforce_n,1\n")
     code, out, err = run("calibrate bench.csv")
     assert (code, out) == (2, "")
-    assert "no curve can be fitted to (force_n: no design describes the actuator)" in err
+    assert "no curve can be fitted (force_n: no design describes the actuator)" in err
 
 
 def test_a_kit_is_not_overwritten(run: Run) -> None:

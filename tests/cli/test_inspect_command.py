@@ -78,7 +78,7 @@ def test_a_bar_tells_the_scale(coupon: Path, tmp_path: Path, run: Run) -> None:
     [
         ("coupon/coupon.csv", [], "not a picture that can be read"),
         ("none.png", [], "is not a file"),
-        ("bare.png", [], "states no resolution; give --dpi"),
+        ("bare.png", [], "states no resolution; give the --dpi"),
         ("scan.png", ["--dpi", "300"], "does not show coupon"),
         # Read as a sheet without its pieces, the film seems larger than drawn.
         ("scan.png", ["--paper", "light"], ""),

@@ -95,7 +95,7 @@ def test_an_oblong_balloon_holds_as_much_as_predict_says(radial: Laminate) -> No
     best = minimize_scalar(lambda b: -held(b), bounds=(0.5, math.pi / 2), method="bounded")
     most = -float(best.fun)
     assert most == pytest.approx(410, abs=1)
-    with pytest.raises(DesignError, match=rf"ask for {math.floor(most * 100) / 100:.2f} ul"):
+    with pytest.raises(DesignError, match=rf"use at most {math.floor(most * 100) / 100:.2f} ul"):
         conforming_meshes(radial, MeshSettings(h=0.75, fill_ul=most + 0.1))
     with pytest.raises(DesignError, match=f"{most:.1f}"):
         predict("radial-15mm", volumes_ul=(most + 0.1,))

@@ -248,7 +248,7 @@ def test_what_no_model_inflates_is_drawn_flat_and_said_to_be(
     code, said = run(*flat, "--to", "other.glb", "--pressure", "5")
     assert (code, "--pressure is for " in said) == (2, True)
     code, said = run(*flat, "--to", "other.webp")
-    assert (code, "a .png or .glb shows it flat" in said) == (2, True)
+    assert (code, "write a .png or .glb of the flat solid" in said) == (2, True)
     assert not list(Path().glob("other.*"))
 
 

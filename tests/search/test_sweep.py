@@ -192,7 +192,7 @@ def test_rows_that_miss_a_limit_fail_by_its_name(
     assert wide["force@1mm@320kPa.verdict"] == "fail"
     with pytest.raises(DesignError) as refused:
         sbafab.find("1dof-5mm", {"chamber.diameter": 6}, least=limits["least"], free=FIXED)
-    (told,) = re.findall("320 kPa is past [^(]*[^( ]", str(refused.value))
+    (told,) = re.findall("320 kPa exceeds [^(]*[^( ]", str(refused.value))
     assert f"force@1mm@320kPa: {told}" in wide["reason"]
     page = (swept.folder / "sweep.html").read_text()
     assert "burst: at least 300 kPa" in page

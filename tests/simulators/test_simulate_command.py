@@ -58,7 +58,7 @@ def test_a_simulator_that_is_missing(tmp_path: Path, name: str) -> None:
     [
         (["--with", "calculix", "--pressure", "6 inches"], "must be a pressure"),
         (["--with", "calculix", "--chamber", "chamber1"], "must be NAME=PRESSURE"),
-        (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which is not there"),
+        (["--with", "calculix", "--chamber", "left=3"], "names chamber left, which does not exist"),
         (["--with", "calculix", "--scene", "volume"], "scene is for sofa"),
         (["--with", "calculix", "--h", "3"], "h = 3"),
         (["--with", "sofa", "--h", "0.3"], "h is for calculix"),
@@ -107,7 +107,7 @@ def test_parts_that_are_images_take_one_pressure(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, [*arguments, "--chamber", "chamber2=1"])
     assert result.exit_code == 2
     assert "symmetry half computes" in result.stderr
-    assert "give both one pressure" in result.stderr
+    assert "use equal pressures for both" in result.stderr
     assert list(tmp_path.iterdir()) == []
 
 
