@@ -309,10 +309,10 @@ class PredictionRequest:
     """Conditions of a prediction: gauge pressures in kPa, flow in ml/min into each chamber or all,
     volumes in ul per balloon, and factors.
 
-    Without ``calibration`` the factors come from the design's calibration, replaced by the user's
-    values (``overrides``, by field of ``Factors``) where given. Intervals contain a measurement
-    with this ``probability``. If one figure is ``wanted``, other slow ones are omitted. Values
-    ``measured`` on an actuator narrow the prediction to that actuator.
+    Without ``calibration`` the factors come from the design's calibration, with ``tip_load`` g on
+    the free tip. Intervals contain a measurement with this ``probability`` (a share). If one figure
+    is ``wanted``, other slow ones are omitted. Values ``measured`` on an actuator narrow the
+    prediction to that actuator.
     """
 
     pressures_kpa: tuple[float, ...] = USUAL_PRESSURES

@@ -83,10 +83,7 @@ def descent(
 
 def newton_step(gradient: Array, matrix: Array) -> Array:
     """Return Newton's steps (n, freedoms) from gradients and second derivatives (n, groups, size,
-    size).
-
-    They are descent directions even if these are not positive definite and the step leads uphill
-    or, with ``is_strict``, anywhere but toward a saddle.
+    size), made positive definite: steps lead downhill, and never toward a saddle.
     """
     slopes = gradient.reshape(matrix.shape[:3])
     step = -np.linalg.solve(definite(matrix), slopes[..., None])[..., 0]

@@ -63,9 +63,8 @@ LITTLE = 0.005
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of a sweep, read again for each pass, so that only the disk limits their number.
-
-    Files get the most important columns, or all of them with ``is_whole``.
+    """Rows of a sweep, read again for each pass, so that only the disk limits their number. Files
+    get the most important columns.
     """
 
     rows: Callable[[], Iterator[SweepRow]]
