@@ -97,9 +97,9 @@ def check_folder(folder: Path, nets: Path | None = None) -> tuple[Finding, ...]:
     whether all files match the design; with ``nets``, a file, also whether the layers match that
     netlist.
 
-    In a job's folder all designs and their shared film sheets are checked. Raises OutputError for a
-    folder without a valid manifest or without cut files, DesignError for an unreadable netlist, or
-    one of a job.
+    In a job's folder all designs are checked, and the film sheets they share. Raises OutputError
+    for a folder without a sound manifest or without cut files, and for one inside a job's,
+    DesignError for a netlist that cannot be read, or one of a job.
     """
     netlist = None if nets is None else read_netlist(nets)
     index = read_index(folder)
@@ -362,10 +362,7 @@ def _remade_problems(
 
 
 def _remake(folder: Path, index: Manifest | JobManifest, order: Order, fresh: Path) -> None:
-    """Write the files of a run to ``fresh``, its manifest without hashes.
-
-    A design of a job has no film sheets and no pages in its own folder.
-    """
+    """Write the files of a run to ``fresh``, its manifest without hashes."""
     parts = {*EVERYTHING}
     if isinstance(index, Manifest):
         parts = _parts(index.files)
@@ -406,10 +403,7 @@ def _foreign_problems(index: Manifest | JobManifest, remade: Collection[str]) ->
 def _compared(
     folder: Path, fresh: Path, index: Manifest | JobManifest
 ) -> tuple[list[Finding], set[str]]:
-    """Return the files that differ from regenerated ones, and those that were saved again.
-
-    Differences of the files in ``layers`` were reported when they were read.
-    """
+    """Return the files that differ from those made again, and those that were saved anew."""
     problems: list[Finding] = []
     equal: set[str] = set()
     bare: list[str] = []

@@ -274,8 +274,9 @@ def simulate(
 ) -> Simulated:
     """Run the simulator into ``out/<design name>/<name>/``; ``export`` only writes its input.
 
-    Raises DesignError or OutputError for unsupported input, if possible before the run starts, and
-    VoidError if the result is invalid; nothing is written then.
+    Raises DesignError or OutputError for what it cannot do, if possible before it starts, and
+    VoidError where its result cannot be. It runs in a folder beside the design's, which stays if it
+    has a log that says what went wrong, or results whose place was taken meanwhile.
     """
     progress = progress or ignore_progress
     refuse_unused(name, wish)

@@ -338,10 +338,11 @@ def _spread(count: int) -> Array:
 
 def _fitted(frame: BalloonMap, shapes: Shapes, h: Array, free: Shapes) -> Array:
     """Return the coefficients of the potential: least squares of W, the force and the volume of
-    balloons between plates at heights ``h``, and of ``free`` ones.
+    balloons between plates at heights ``h``, and of ``free`` ones, within the limits.
 
     ``inflate`` fixes the wrinkles' stress while it seeks equilibrium, so its forces and volumes are
-    not exactly the derivatives of one potential. Heights and bends depend on the forces.
+    not exactly slopes of one potential. Heights and bends depend on the forces. Raises DesignError
+    if no coefficients are within the limits.
     """
     top, p = frame.most_height, shapes.pressure
     area = shapes.r[:, -1].max() ** 2 * math.pi
@@ -410,12 +411,8 @@ each row by pressure, added to the result.
 
 
 class MapLimits:
-    """Functions of a spline's coefficients ``units * x`` that must be positive, with MARGIN as
-    target.
-
-    Limits are ``rows @ x >= least``. A row is the product of one by pressure and one by height, of
-    six coefficients each, over the length ``size`` of its gradient g, sqrt(g @ metric @ g). All
-    products with ``rows``, (values, coefficients), are computed from these.
+    """Functions of a spline's coefficients ``units * x`` that must be above 0, with MARGIN as
+    target: the products of the rows by pressure and by height of each kind, over their lengths.
     """
 
     def __init__(self, units: Array, *kinds: MapLimit) -> None:
@@ -445,10 +442,7 @@ def _limits(frame: BalloonMap, area: float, pressures: Array, held: Array) -> It
     height, as shares of area times height. Forces fall with height, as shares of pressure times
     area.
 
-    Volumes rise with pressure, are positive without pressure, and at the end of each piece are at
-    most the largest volume ``held`` at the next of ``pressures`` at any height, as fractions of
-    area times height. Forces fall with height, as fractions of pressure times area. The limits
-    apply to Bernstein coefficients, so that they also hold between places.
+    The limits apply to Bernstein coefficients, so that they also hold between places.
     """
     top, scale_pressure = frame.most_height, frame.scale_pressure
     each = PRESSURE_SPANS / math.asinh(frame.most_pressure / scale_pressure)
@@ -494,10 +488,12 @@ def _parts(ends: Array, order: int, spans: int) -> Array:
 
 
 def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array | None:
-    """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance d @
-    ``metric`` @ d; None if no such x is found.
+    """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
+    d @ ``metric`` @ d; None if no such x is found.
 
-    Mehrotra's predictor-corrector method (Nocedal and Wright, Numerical Optimization, Sec. 16.6).
+    Dual active set (Goldfarb and Idnani, Math. Programming 27 (1983) 1): the limit that is missed
+    most joins those that hold x, ``rows`` of the metric's root, which push x by ``pushes``; those
+    whose push would change its sign are let go.
     """
     root = np.linalg.inv(np.linalg.cholesky(metric))
     x, rows, pushes, gram = point, np.zeros((0, len(point))), np.zeros(0), np.zeros((0, 0))
@@ -554,11 +550,12 @@ PLACE_DIGITS = 6
 
 
 def holds_at(made: BalloonMap, pressure: Array, height: Array) -> NDArray[np.bool_]:
-    """Return where a map is within MOST_ERROR of the balloons computed at places (n,); False
-    outside the map.
+    """Return where a map is within MOST_ERROR of the balloons computed at places (n,); not where
+    one lies outside the map. Raises DesignError if one has no equilibrium.
 
-    Suction counts as zero pressure, and heights below FLAT as FLAT. The balloons are those of the
-    base map. Raises DesignError if a balloon has no equilibrium.
+    Forces are compared as shares of pressure (and 0.1 kPa) times pocket, and the force; volumes as
+    shares of the volume and of what a pocket holds at the least height computed. Suction counts as
+    no pressure, and heights below FLAT as FLAT. The balloons are ``drawn``'s.
     """
     base = made.drawn
     places = np.stack([np.maximum(pressure / made.ratio, 0.0), np.maximum(height, FLAT)], -1)

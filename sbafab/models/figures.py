@@ -349,9 +349,8 @@ class PredictionRequest:
 
 @dataclass(frozen=True, repr=False)
 class Prediction:
-    """The prediction for one design.
-
-    For an actuator with measured values, ``before`` has the figures without these.
+    """The prediction of one design; if it is that of an actuator on which values were measured,
+    ``before`` has the figures without these. ``curves`` computes its relations.
     """
 
     asked: PredictionRequest

@@ -125,12 +125,12 @@ def membrane(flat: Balloon, at: Elements, cap: Array) -> EnergyTerm:
 
 
 def bending(flat: Balloon, at: Elements) -> tuple[EnergyTerm, list[Array]]:
-    """Return the bending energy along the meridian and the hoop between clamped edges; and the
-    second derivatives that couple the elements before and after a kink, with respect to dr dr, dr
-    dz, dz dr and dz dz of the two, each (kinks, films).
+    """Return the bending energy along the meridian and round the hoop between clamped edges; and
+    the second derivatives that couple the elements before and after a kink, by dr dr, dr dz, dz dr
+    and dz dz of the two, each (kinks, films).
 
-    The elements outside the nodes ``bent`` are bonded face to face with their mirror image: they do
-    not bend, but are compliant at their root like the arms of a double cantilever beam.
+    The elements of neck and rim are bonded face to face with their mirror image: they do not bend,
+    but give way at their root as the arms of a double cantilever beam do.
     """
     slope, rigidity, edge = np.arctan2(-at.dz, at.dr), flat.bending_stiffness, flat.edge
     kink = slope[1 : edge + 1] - slope[:edge]

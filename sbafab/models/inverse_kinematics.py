@@ -73,7 +73,7 @@ def reached(
 
 class Search:
     """The ``best`` poses of a column under a load for places (n, 3), with coordinates of pressures
-    up to ``most``; the distance ``away`` (n) of their tips in mm, and whether the search is over.
+    up to ``most``; how far ``away`` (n) their tips count in mm, and where the search is over.
     """
 
     def __init__(self, column: Column, load: Load | None, places: Array, most: float) -> None:

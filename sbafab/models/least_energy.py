@@ -1,5 +1,5 @@
-"""Equilibria as energy minima, many at once: damped Newton's method with a line search, and its
-linear algebra (banded solvers, safeguarded steps).
+"""Equilibria as minima of energy, many at once: damped Newton's method with a line search, and its
+linear algebra of banded matrices.
 """
 
 from __future__ import annotations
@@ -38,7 +38,15 @@ def equilibrium(
     scale: Array,
     close: Array,
 ) -> Array:
-    """Return the coordinates (coordinates, rows) of the energy minimum downhill of these."""
+    """Return the coordinates (coordinates, rows) of least energy downhill of these.
+
+    ``energies`` of coordinates and the numbers of their rows are the energies (rows,), their
+    gradient (coordinates, rows) and second derivatives as a band (coordinates, width, rows) that
+    holds ``A[i, i + k]`` at ``[i, k]``. ``change`` is the largest share of its length by which a
+    step from coordinates changes an element: (rows,). ``scale`` (rows,) is the energies' scale,
+    ``close`` (rows,) the tolerance of the gradient. Raises NoEquilibrium if Newton's method does
+    not converge.
+    """
     minimum, live = x.copy(), np.arange(x.shape[1])
     step_taken, share = np.zeros_like(x), np.ones(len(live))
     damping, slope = np.zeros(len(live)), np.zeros(len(live))

@@ -120,9 +120,8 @@ def predict(
     ``quick`` leaves out curves and the elastic stack. If factors are given, intervals are not
     computed, and figures are not flagged for lying outside the checked part of a balloon's map.
 
-    If factors are given, there are no intervals, and figures are not flagged for lying outside the
-    checked part of a balloon's map. Raises DesignError if the design cannot be built, or for
-    pressures, a flow or volumes that are out of range.
+    Raises DesignError if the design cannot be built, or for pressures, a flow or volumes that
+    are out of range.
     """
     asked_request = request or PredictionRequest()
     uncertainty = None
@@ -270,8 +269,8 @@ def _check_request(actuator: Actuator, request: PredictionRequest) -> None:
 
 
 def _measured(figure: Figure, actuator: Actuator) -> paper.Counterpart | None:
-    """Return the paper's measurement if the figure deviates far; None for a folded height with a
-    factor.
+    """Return the paper's measurement if the figure is far off; None for a folded height with a
+    press factor.
     """
     model, form = figure.model, actuator.form
     if model.id is ModelId.FILMS and model.press_factor != 1:

@@ -63,8 +63,10 @@ LITTLE = 0.005
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of a sweep, read again for each pass, so that only the disk limits their number. Files
-    get the most important columns.
+    """Rows of a sweep, read again for each pass, so that only the disk limits their number.
+
+    ``values`` are of the varied keys, a set for each row; ``limited`` are labels of the quantities
+    that have limits, which stand among the rules.
     """
 
     rows: Callable[[], Iterator[SweepRow]]
