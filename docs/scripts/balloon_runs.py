@@ -22,8 +22,8 @@ from docs.scripts.ripple_sector import Sector, sector_states
 from docs.scripts.tables import FOLDER, Table, table
 from sbafab.actuators import load_design
 from sbafab.meshing.conforming.layup import MeshSettings
-from sbafab.models.balloon import Balloon
 from sbafab.models.balloons import balloons_of
+from sbafab.models.film_elements import Balloon
 from sbafab.models.rim_correction import free_shapes
 from sbafab.simulators.calculix import deck_settings, simulate
 

@@ -21,8 +21,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, Shapes
-from sbafab.models.film_elements import Array
+from sbafab.models.balloon import Shapes
+from sbafab.models.film_elements import Array, Balloon
 from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from sbafab.runtime import one_blas_thread
 

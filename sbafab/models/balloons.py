@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from sbafab.design.records import Discs, Form
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon
+from sbafab.models.film_elements import Balloon
 
 if TYPE_CHECKING:
     from sbafab.design.records import Design

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 from sbafab.errors import BeyondError, DesignError
 from sbafab.models import paper
 from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon, Shapes, inflate
+from sbafab.models.balloon import Shapes, inflate
 from sbafab.models.balloon_map import MOST_STRETCH, BalloonMap, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.column import BatchPoses
@@ -33,7 +33,7 @@ from sbafab.models.figures import (
     Relation,
     Trace,
 )
-from sbafab.models.film_elements import Array
+from sbafab.models.film_elements import Array, Balloon
 from sbafab.models.pneumatics import AIR, TUBE_LENGTH, WATER, Line
 from sbafab.models.quantity import Conditions, Quantity, chamber_count
 from sbafab.models.rim_correction import compressed_shapes, free_shapes

@@ -10,19 +10,121 @@ these into derivatives with respect to the coordinates of nodes.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from sbafab.models.balloon import Balloon
+from sbafab.laminate.films import PAPER_TPE
 
 Array = NDArray[np.float64]
+FILM_ELEMENTS = 24
+RIM_ELEMENTS = 5
+NECK_ELEMENTS = 2
 ROOT_LENGTH = 0.645
 """Thicknesses by which a film bends on past the edge of its bond: end correction of Williams (1989)
 for a double cantilever beam, isotropic, nu = 0.2.
 """
+
+
+@dataclass(frozen=True)
+class Balloon:
+    """A balloon and its film: radii, width of the ring and thickness in mm, modulus in kPa.
+
+    ``neck`` is the radius bonded to the next balloon, ``bore`` the radius of its hole; both are 0
+    for a lone balloon. Without ``wrinkles`` films stay as smooth as in an axisymmetric mesh.
+    ``inextensible`` is the limit of a film, rim included, that neither bends nor carries
+    compression: the modulus must then be large. ``order`` m selects the strain in which the energy
+    is quadratic, (stretch^m - 1) / m: 2 is Saint Venant's and Kirchhoff's law, as in programs for
+    linear films; films of higher orders stiffen.
+    """
+
+    pocket: float = 2.5
+    ring: float = 0.75
+    neck: float = 0.0
+    bore: float = 0.0
+    thickness: float = 0.038
+    modulus: float = 1000 * PAPER_TPE[0]
+    poisson: float = PAPER_TPE[1]
+    wrinkles: bool = True
+    inextensible: bool = False
+    order: int = 2
+    mate: Balloon | None = None
+    """The second film if the two differ: of the same sizes, and without a mate itself."""
+
+    def stiffened(self, ratio: float) -> Balloon:
+        """Return the balloon with the modulus of its films multiplied by ``ratio``."""
+        mate = None if self.mate is None else self.mate.stiffened(ratio)
+        return replace(self, modulus=ratio * self.modulus, mate=mate)
+
+    @cached_property
+    def nodes(self) -> Array:
+        """The radii of the flat film's nodes, mm, closer at neck and rim, where it bends."""
+        even = np.linspace(0, 1, FILM_ELEMENTS + 1)
+        close = (1 - np.cos(math.pi * even)) / 2 if self.neck else np.sin(math.pi / 2 * even)
+        film = self.neck + (self.pocket - self.neck) * (0.6 * close + 0.4 * even)
+        neck_nodes = np.linspace(self.bore, self.neck, NECK_ELEMENTS + 1)[:-1]
+        neck = neck_nodes if self.neck else neck_nodes[:0]
+        rim = self.pocket + self.ring * np.linspace(0, 1, RIM_ELEMENTS + 1)[1:] ** 2
+        return np.concatenate([neck, film, rim])
+
+    @property
+    def neck_edge(self) -> int:
+        """The number of the node at the neck's edge; 0, the pole, without a neck."""
+        return NECK_ELEMENTS if self.neck else 0
+
+    @property
+    def edge(self) -> int:
+        """The number of the node at the pocket's edge."""
+        return self.neck_edge + FILM_ELEMENTS
+
+    @cached_property
+    def lengths(self) -> Array:
+        return np.diff(self.nodes)
+
+    @cached_property
+    def middles(self) -> Array:
+        return np.asarray((self.nodes[1:] + self.nodes[:-1]) / 2)
+
+    @cached_property
+    def squares(self) -> tuple[Array, Array, Array]:
+        """Squares of the flat elements' lengths and middle radii, mm2, and their volumes in mm3:
+        (elements, 1) each.
+        """
+        volumes = math.tau * self.middles * self.lengths * self.thickness
+        return self.lengths[:, None] ** 2, self.middles[:, None] ** 2, volumes[:, None]
+
+    @cached_property
+    def node_areas(self) -> Array:
+        """The area in mm2 of each node, 0 outside the pocket: (nodes, 1)."""
+        areas = math.tau * self.nodes * np.gradient(self.nodes)
+        return np.asarray(np.where(np.arange(len(areas)) < self.edge, areas, 0.0)[:, None])
+
+    @property
+    def membrane_stiffness(self) -> float:
+        """Modulus times thickness, N/m."""
+        return self.modulus * self.thickness
+
+    @property
+    def bending_stiffness(self) -> float:
+        """The bending stiffness B of one film in kPa mm3."""
+        if self.inextensible:
+            return 0.0
+        return self.modulus * self.thickness**3 / (12 * (1 - self.poisson**2))
+
+    @cached_property
+    def is_free(self) -> NDArray[np.bool_]:
+        """True for the elements between neck and rim."""
+        number = np.arange(len(self.nodes) - 1)
+        return (number >= self.neck_edge) & (number < self.edge)
+
+    @cached_property
+    def may_wrinkle(self) -> NDArray[np.bool_]:
+        """True for elements that may wrinkle: in the film, outside neck and rim."""
+        beyond = np.arange(len(self.nodes) - 1) >= self.edge
+        return (self.is_free & self.wrinkles) | (beyond & self.inextensible)
 
 
 class Elements(NamedTuple):

@@ -14,8 +14,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from sbafab.models.balloon import Balloon, Shapes, inflate
-from sbafab.models.film_elements import Array
+from sbafab.models.balloon import Shapes, inflate
+from sbafab.models.film_elements import Array, Balloon
 
 WIDE = 3.8
 """Pocket radius in ring widths above which films wave with the rim."""

@@ -24,13 +24,12 @@ from sbafab.actuators import build
 from sbafab.design.records import Design, Form
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate, film_mass
-from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import BalloonMap, balloon_map
 from sbafab.models.balloons import balloons_of
 from sbafab.models.column import BatchPoses, Column, Plate, Pose, numbers_of, vector_of
 from sbafab.models.derivatives import Derivatives, derivatives
 from sbafab.models.figures import Factors
-from sbafab.models.film_elements import Array
+from sbafab.models.film_elements import Array, Balloon
 from sbafab.models.inverse_kinematics import reached
 from sbafab.models.motion import BatchMotion, Motion
 from sbafab.models.paper import counterparts_of_pose

@@ -19,14 +19,13 @@ from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
 from sbafab.models import elastic, paper
 from sbafab.models.actuator import Actuator
-from sbafab.models.balloon import Balloon
 from sbafab.models.balloon_map import MOST_STRETCH, stretch
 from sbafab.models.balloons import balloons_of
 from sbafab.models.calibration import UNKNOWNS
 from sbafab.models.closed_forms import modulus, second_moments
 from sbafab.models.column import BatchPoses
 from sbafab.models.figures import Factors, Model, PredictionRequest
-from sbafab.models.film_elements import Array
+from sbafab.models.film_elements import Array, Balloon
 from sbafab.models.pneumatics import AIR, TUBE_DIAMETER, TUBE_LENGTH, Line, usual_pressures
 from sbafab.models.prediction import plate_of, predict
 from sbafab.models.quantity import Quantity, chamber_count

@@ -82,7 +82,8 @@ def test_models_are_solved_on_one_thread_and_the_caller_keeps_its_own(
     lines = printed(
         f"""
 from sbafab.models import column
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
+from sbafab.models.film_elements import Balloon
 from sbafab.models.stack import StackBatch
 solve, within = {solver}, set()
 

@@ -12,7 +12,8 @@ import pytest
 from docs.scripts.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.errors import DesignError
 from sbafab.models import balloon
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
+from sbafab.models.film_elements import Balloon
 from tests.quick import few
 
 TPE = Balloon()

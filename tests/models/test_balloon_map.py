@@ -12,7 +12,7 @@ import pytest
 import sbafab
 from sbafab.errors import DesignError
 from sbafab.models import balloon_map as map_module
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import (
     DEGREE,
     HEIGHT_SPANS,
@@ -24,6 +24,7 @@ from sbafab.models.balloon_map import (
     horner,
 )
 from sbafab.models.elastic import OUTSIDE
+from sbafab.models.film_elements import Balloon
 from sbafab.models.rim_correction import compressed_shapes, free_shapes
 from tests.quick import few
 from tests.shared import shared

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.balloon import Balloon
 from sbafab.models.elastic import chamber_clearances, rim_gap
+from sbafab.models.film_elements import Balloon
 from sbafab.models.stack import Stack
 from sbafab.models.stack_loads import RING_POINTS
 

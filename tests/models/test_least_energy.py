@@ -10,14 +10,13 @@ import pytest
 
 from sbafab.models import least_energy
 from sbafab.models.balloon import (
-    RIM_ELEMENTS,
-    Balloon,
     BalloonLoad,
     initial_shape,
     rim_ripples,
     ripple_energy,
     total_energy,
 )
+from sbafab.models.film_elements import RIM_ELEMENTS, Balloon
 from sbafab.models.least_energy import NoEquilibrium, equilibrium
 
 INNER = Balloon(neck=1.25, bore=0.5)

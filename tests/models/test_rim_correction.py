@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from docs.scripts.ripple_sector import Sector, sector_states
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
+from sbafab.models.film_elements import Balloon
 from sbafab.models.rim_correction import compressed_shapes, free_shapes, is_corrected
 
 WIDE = Balloon(5.0)

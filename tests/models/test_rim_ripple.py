@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from sbafab.models import balloon
-from sbafab.models.balloon import Balloon, coordinates, inflate, ripples_at
+from sbafab.models.balloon import coordinates, inflate, ripples_at
+from sbafab.models.film_elements import Balloon
 
 WIDE = Balloon(pocket=60.0)
 """So wide that its rim is nearly a straight strip."""

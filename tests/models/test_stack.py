@@ -11,9 +11,10 @@ import pytest
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
 from sbafab.models.elastic import blocked_force, pose_bent_by
 from sbafab.models.figures import Factors
+from sbafab.models.film_elements import Balloon
 from sbafab.models.rim_correction import free_shapes
 from sbafab.models.stack import Plate, Stack, StackBatch, stack
 from sbafab.models.stack_loads import WALL_RIM, energy

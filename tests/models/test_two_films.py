@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import sbafab
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
+from sbafab.models.film_elements import Balloon
 from sbafab.simulators.calculix import read_frd, run_ccx
 
 SMOOTH = Balloon(wrinkles=False)

@@ -9,7 +9,8 @@ import pytest
 
 from docs.scripts.balloon_runs import CASES, Case, elastic, known
 from docs.scripts.ripple_sector import Sector, sector_states
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
+from sbafab.models.film_elements import Balloon
 from tests.quick import few
 
 LIMITS = {"held smooth": 1.5, "free to wrinkle": 3.0, "even ripples": 3.0, "half a wave": 3.0}

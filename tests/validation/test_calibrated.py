@@ -12,7 +12,7 @@ import tomli_w
 
 import sbafab
 from sbafab.errors import DesignError
-from sbafab.models.balloon import Balloon, inflate
+from sbafab.models.balloon import inflate
 from sbafab.models.balloon_map import balloon_map
 from sbafab.models.calibration import (
     FIELDS,
@@ -27,6 +27,7 @@ from sbafab.models.calibration import (
     read_calibration,
 )
 from sbafab.models.figures import Factors
+from sbafab.models.film_elements import Balloon
 
 
 @pytest.fixture(scope="module")
