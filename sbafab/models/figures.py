@@ -542,7 +542,7 @@ def _note(figure: Figure, before: Figure | None = None) -> str:
         low, high = paper.EQ_4_RATIOS
         return (
             f"{low * figure.value:.3g} to {high * figure.value:.3g} N by the paper's six forces at "
-            f"{paper.FORCE_KPA:g} kPa, {low:.2f} to {high:.2f} times this model"
+            f"{paper.FORCE_KPA:g} kPa on pockets of 5 mm, {low:.2f} to {high:.2f} times this model"
         )
     return figure.model.trust
 

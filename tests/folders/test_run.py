@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+import sbafab
 from sbafab.actuators import build, load_design
 from sbafab.design.identity import design_sha256
 from sbafab.design.laminate_file import read_laminate
@@ -209,3 +210,10 @@ def test_conforming_meshes_stay_beside_those_of_a_later_run(tmp_path: Path) -> N
     assert (later.folder / "mesh" / "volume.vtu").is_file()
     other = generate(RunRequest(load_design("1dof-5mm"), tmp_path))
     assert not (other.folder / "mesh" / "volume.vtu").exists()
+
+
+def test_a_pin_that_no_step_uses_has_a_hole_without_a_depth(tmp_path: Path) -> None:
+    """A check that passes, or is waived, is followed by files."""
+    pin = 'pins=[{name="p1", at=[15,0], diameter=1.0, clearance=0.04}]'
+    run = sbafab.generate("pouch", pin, "rules.waive=['pin-holes']", out=tmp_path)
+    assert "not used" in (run.folder / "bench.html").read_text(encoding="utf-8")
