@@ -41,6 +41,7 @@ from sbafab.simulators.simulator import (
     Stop,
     chamber_pressures,
     impossible,
+    pass_on_interrupt,
     program_path,
     rendered,
     run_program,
@@ -638,6 +639,7 @@ def simulate(
         frames = [frame for frame in every if frame.time <= reached * (1 + SAME_TIME)]
     if not frames:
         stop = stop or Stop("failed", "it wrote no result")
+        pass_on_interrupt(stop)
         raise OutputError(
             f"ccx stopped at {place}, before the first result: {stop.words}; "
             f"{_advice(stop, settings)}"

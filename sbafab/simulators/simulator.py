@@ -486,6 +486,12 @@ def run_program(
     return process.returncode, stopped
 
 
+def pass_on_interrupt(stopped: Stop | None) -> None:
+    """Raise KeyboardInterrupt if a run without results was interrupted: nothing is to be kept."""
+    if stopped is not None and stopped.kind == "interrupt":
+        raise KeyboardInterrupt
+
+
 def _end(process: subprocess.Popen[bytes]) -> None:
     """End the program and its child processes."""
     for number in (signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM)):
@@ -619,6 +625,7 @@ def run_model(
         why = f"its record ends before {seconds:g} s or is not finite from there on"
     is_cut_short = stopped is not None and bool(records) and trouble is None
     if why and not is_cut_short:
+        pass_on_interrupt(stopped)
         known = f"the tip is known to {records[-1][0]:g} s" if records else "nothing is known of it"
         raise VoidError(f"{name} ended prematurely: {why}; {known} (see {log})")
     states = tuple(films.state(*each) for each in records)

@@ -15,7 +15,7 @@ from filelock import FileLock
 import sbafab
 from sbafab.cli import app
 from sbafab.models.calibration import factors_of
-from sbafab.simulators.simulator import NAMES, SimulationRequest, chamber_pressures
+from sbafab.simulators.simulator import NAMES, SimulationRequest, Stop, chamber_pressures
 from tests.simulators.conftest import StandIn
 from tests.simulators.test_recorded_runs import SOFA
 from tests.site.formats import hold
@@ -167,6 +167,20 @@ def test_the_log_of_a_void_run_is_where_the_message_says(tmp_path: Path, stand_i
     assert not (out / "1dof-5mm").exists()
     assert named is not None, found.output
     assert "[ERROR] what went wrong" in Path(named[1]).read_text(encoding="utf-8")
+
+
+def test_an_interrupted_run_without_results_leaves_nothing(
+    tmp_path: Path, stand_in: StandIn, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(command: object, log: Path, *_: object) -> tuple[int, Stop]:
+        log.write_text("")
+        return -2, Stop("interrupt", "it was interrupted")
+
+    stand_in("runSofa", "")
+    monkeypatch.setattr("sbafab.simulators.simulator.run_program", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sbafab.simulate("1dof-5mm", "stack.balloons=1", simulator="sofa", out=tmp_path / "out")
+    assert not list((tmp_path / "out").iterdir())
 
 
 @pytest.fixture
