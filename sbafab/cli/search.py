@@ -262,7 +262,8 @@ def sweep(
         return
     if swept.no_longer_asked:
         show.line(
-            f"The tables leave out {swept.no_longer_asked} designs of an earlier sweep; its "
+            f"The tables leave out {show.several(swept.no_longer_asked, 'design')} of an earlier "
+            "sweep; its "
             "command restores them from the journal"
         )
     failed = ", ".join(f"{cause} {number}" for cause, number in swept.failed.items())
