@@ -163,7 +163,7 @@ def mesh(
 ) -> Run:
     """Write solid, cavities and conforming meshes; the run's ``conforming`` lists the latter.
 
-    ``formats`` are any of "vtu", "vtk", "msh", "inp" and "stl". ``h`` mm and the
+    ``formats`` are any of "vtu", "vtk", "msh", "inp", "stl", "obj" and "ply". ``h`` mm and the
     arguments after it are the fields of ``MeshSettings``; ``tables`` override tables of the design.
     Needs the extra "mesh". Raises DesignError and OutputError.
     """

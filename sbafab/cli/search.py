@@ -263,8 +263,7 @@ def sweep(
     if swept.no_longer_asked:
         show.line(
             f"The tables leave out {show.several(swept.no_longer_asked, 'design')} of an earlier "
-            "sweep; its "
-            "command restores them from the journal"
+            "sweep; its command restores them from the journal"
         )
     failed = ", ".join(f"{cause} {number}" for cause, number in swept.failed.items())
     words = {"passes": "passed", "fails": f"failed ({failed})"}

@@ -23,7 +23,7 @@ from sbafab.meshing.surface import Floats, Ints, Surface
 
 Field = Floats | Ints | NDArray[np.int32] | NDArray[np.uint8]
 
-# Surfaces as STL, and as GLB for viewers; trimesh writes them.
+# Surfaces as STL, OBJ and PLY, and as GLB for viewers; trimesh writes them.
 
 
 LinearRGB = tuple[float, float, float]
@@ -45,6 +45,16 @@ class Node(NamedTuple):
 def write_stl(surface: Surface, path: Path, _material: str = "") -> None:
     """Write binary STL in mm; the format cannot store a unit or a material."""
     path.write_bytes(surface.trimesh().export(file_type="stl"))
+
+
+def write_obj(surface: Surface, path: Path) -> None:
+    text = surface.trimesh().export(file_type="obj", header="mm", digits=9)
+    path.write_text(text, encoding="ascii", newline="\n")
+
+
+def write_ply(surface: Surface, path: Path) -> None:
+    """Write binary PLY in mm, in single precision."""
+    path.write_bytes(surface.trimesh().export(file_type="ply"))
 
 
 def write_glb(surface: Surface, path: Path, material: str = "TPE") -> None:
@@ -351,6 +361,8 @@ _OWN = (
     MeshFormat("msh", elements=write_msh),
     MeshFormat("inp", elements=write_inp),
     MeshFormat("stl", solid=write_stl, surface=write_stl),
+    MeshFormat("obj", surface=write_obj),
+    MeshFormat("ply", surface=write_ply),
     MeshFormat("3mf", solid=write_3mf),
     MeshFormat("glb", solid=write_glb),
 )

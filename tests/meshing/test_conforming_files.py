@@ -158,24 +158,25 @@ def read_inp(path: Path) -> tuple[np.ndarray, np.ndarray, dict[tuple[str, str], 
     return np.array(nodes), np.array(elements), sets
 
 
-def test_standalone_cavities_are_closed_and_look_outward(written: Written) -> None:
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
+def test_standalone_cavities_are_closed_and_look_outward(written: Written, suffix: str) -> None:
     meshes, files, folder = written
-    read = trimesh.load(folder / "cavity_A_conforming.stl")
+    read = trimesh.load(folder / f"cavity_A_conforming.{suffix}")
     assert read.is_watertight
     assert read.volume == pytest.approx(meshes.volume.cavity("A")[0].volume, rel=1e-6)
-    (listed,) = (file for file in files if file.file.endswith("_conforming.stl"))
+    (listed,) = (file for file in files if file.file.endswith(f"_conforming.{suffix}"))
     assert listed.volume_mm3 == pytest.approx(read.volume, rel=1e-6)
 
 
 def test_only_the_formats_asked_for_are_written(two_balloons: Laminate, tmp_path: Path) -> None:
     meshes = conforming_meshes(two_balloons, MeshSettings(h=0.75, gaps=True))
     told: list[tuple[int, int]] = []
-    files = write_conforming(meshes, tmp_path, lambda *step: told.append(step), ("inp", "stl"))
+    files = write_conforming(meshes, tmp_path, lambda *step: told.append(step), ("inp", "ply"))
     assert [file.file for file in files] == [
         "mesh/volume.inp",
         "mesh/shell.inp",
-        "mesh/skin.stl",
-        "mesh/cavity_A_conforming.stl",
+        "mesh/skin.ply",
+        "mesh/cavity_A_conforming.ply",
     ]
     assert told == [(1, 4), (2, 4), (3, 4), (4, 4)]
 
