@@ -29,16 +29,8 @@ from sbafab.laminate.lay_up import (
     pressed_layers,
     stack_count,
 )
-from sbafab.pressing import press_force
-from sbafab.pressing.dowels import (
-    PinHole,
-    PinSetting,
-    is_sold,
-    pin_holes,
-    settings_by_step,
-)
-from sbafab.pressing.plate_heating import Heating, HeatPoint, heating
-from sbafab.pressing.press_force import (
+from sbafab.pressing import build_up
+from sbafab.pressing.build_up import (
     BASE_PLATE,
     LAMINATE,
     PAD,
@@ -47,6 +39,14 @@ from sbafab.pressing.press_force import (
     BuildUpPart,
     StackShape,
 )
+from sbafab.pressing.dowels import (
+    PinHole,
+    PinSetting,
+    is_sold,
+    pin_holes,
+    settings_by_step,
+)
+from sbafab.pressing.plate_heating import Heating, HeatPoint, heating
 
 
 def joined_words(words: Sequence[str]) -> str:
@@ -256,10 +256,10 @@ def schedule(laminate: Laminate, design: Design, together: Sequence[int] = (1,))
     refuse_temperature(laminate, press)
     parts = press_steps(laminate)
     under, *smaller = (
-        [press_force.footprint(laminate, part.layers, count) for part in parts]
+        [build_up.footprint(laminate, part.layers, count) for part in parts]
         for count in dict.fromkeys(together)
     )
-    pad = press_force.pad_thickness(press, [*under, *chain.from_iterable(smaller)])
+    pad = build_up.pad_thickness(press, [*under, *chain.from_iterable(smaller)])
     (pins, plate), warming = pins_by_step(laminate, design), heating(laminate, press)
     has_minutes = not films_without_minutes(laminate, press.timed_films)
     steps = []
@@ -300,7 +300,7 @@ def pins_by_step(laminate: Laminate, design: Design) -> tuple[list[tuple[PinSett
     """
     press, registration = design.press, design.registration
     on_plate = [
-        press_force.footprint(laminate, part.layers).height
+        build_up.footprint(laminate, part.layers).height
         + _underlay(laminate, part, press)
         + press.release_thickness
         for part in press_steps(laminate)
@@ -344,8 +344,8 @@ def _step(
     line: tuple[HeatPoint, ...],
     minutes: float | None,
 ) -> Step:
-    estimate = press_force.pressures(press, bed.pad, bed.under)
-    basis = press_force.pressure_basis(press, bed.pad, bed.under, estimate)
+    estimate = build_up.pressures(press, bed.pad, bed.under)
+    basis = build_up.pressure_basis(press, bed.pad, bed.under, estimate)
     count = stack_count(laminate, part.layers)
     return Step(
         step=part.number,
@@ -392,7 +392,7 @@ def _size(laminate: Laminate, part: LayUpStep) -> tuple[float, float]:
 def _round_pins(press: Press, bed: _Bed) -> str:
     beneath = bed.under.height + press.release_thickness + bed.underlay
     out = max((pin.stands_mm + pin.tolerance_mm - beneath for pin in bed.pins), default=0.0)
-    return f"; up to {press_force.unpressed(press, out):.1f} mm round a pin none" if out else ""
+    return f"; up to {build_up.unpressed(press, out):.1f} mm round a pin none" if out else ""
 
 
 def _items(press: Press, bed: _Bed, size: tuple[float, float]) -> Iterator[BuildUpPart]:
@@ -539,10 +539,10 @@ def refuse_temperature(laminate: Laminate, press: Press) -> None:
                 f"{above.film.material}, which both stay solid in the press and do not bond; give "
                 f"the {roles} another film in [layup]"
             )
-    if press.temperature_c > press_force.PAD_LIMIT_C:
+    if press.temperature_c > build_up.PAD_LIMIT_C:
         raise DesignError(
             f"{is_set} exceeds the limit of a press pad of {press.pad_material}, "
-            f"{press_force.PAD_LIMIT_C:g} C; lower it"
+            f"{build_up.PAD_LIMIT_C:g} C; lower it"
         )
 
 
@@ -612,7 +612,7 @@ def _cautions(
     if laminate.middle_first and parts[0].name == "flash_middle":
         yield Caution(MIDDLE_FIRST)
     pad = next((i.thickness_mm for s in steps for i in s.build_up if i.part == PAD), 0.0)
-    if (pile := press_force.pad_sheets(pad)) > 1:
+    if (pile := build_up.pad_sheets(pad)) > 1:
         yield Caution(
             f"the press pad is a pile of {pile} sheets, {pad:g} mm high together, which may "
             "slide aside: hold it in a frame, and see whether the press opens so far"

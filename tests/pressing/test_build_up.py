@@ -12,7 +12,7 @@ from sbafab.actuators import load_design
 from sbafab.design.sections import Press
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
-from sbafab.pressing.press_force import (
+from sbafab.pressing.build_up import (
     EVEN,
     PADS,
     StackShape,

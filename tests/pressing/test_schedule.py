@@ -11,12 +11,12 @@ from sbafab.actuators import build, load_design
 from sbafab.cutting.fixture import fixture
 from sbafab.errors import DesignError
 from sbafab.laminate.laminate import Laminate
+from sbafab.pressing.build_up import footprint
 from sbafab.pressing.cycles import (
     design_runs,
     press_runs,
     runs_of,
 )
-from sbafab.pressing.press_force import footprint
 from sbafab.pressing.schedule import schedule
 from sbafab.pressing.schedule_files import press_csv, press_json
 

@@ -39,6 +39,7 @@ from sbafab.laminate.lay_up import (
 from sbafab.models.calibration import factors_of
 from sbafab.models.paper import BURST, FORCE_KPA
 from sbafab.models.sizes import sizes
+from sbafab.pressing.build_up import PAD
 from sbafab.pressing.cycles import (
     CYCLE_HOURS,
     Runs,
@@ -49,7 +50,6 @@ from sbafab.pressing.cycles import (
 )
 from sbafab.pressing.dowels import PinSetting
 from sbafab.pressing.plate_heating import PATIENCE
-from sbafab.pressing.press_force import PAD
 from sbafab.pressing.schedule import FoldStep, SeamStep, Step, joined_words, layers_in_words
 from sbafab.reports import drawing as draw
 from sbafab.reports.canvas import COLOURS, KEY

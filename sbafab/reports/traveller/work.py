@@ -15,9 +15,9 @@ from sbafab.design.identity import adhesive_for, cure_hours, tube_name
 from sbafab.folders.build import Build
 from sbafab.laminate.films import FIRST, Film
 from sbafab.laminate.laminate import Layer
+from sbafab.pressing.build_up import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.dowels import pin_holes
 from sbafab.pressing.plate_heating import START, cool_minutes, warm_minutes
-from sbafab.pressing.press_force import BASE_PLATE, PAD, RELEASE, UNDERLAY, pad_sheets
 from sbafab.pressing.schedule import HANDLING_MINUTES, Step, joined_words
 from sbafab.reports.drawing import layer_numbers
 from sbafab.reports.prints import NAME, PAPER, guides, leaves, tray_sheets
