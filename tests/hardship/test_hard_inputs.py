@@ -109,14 +109,14 @@ def test_other_line_ends_and_marks_are_read(content: bytes, tmp_path: Path) -> N
 
 
 def test_what_the_geometry_cannot_resolve_names_the_design(monkeypatch: pytest.MonkeyPatch) -> None:
-    with pytest.raises(GeometryError, match=r"x 1\.000000, y 2\.000000 .*change a size"):
+    with pytest.raises(GeometryError, match=r"x 1\.000000, y 2\.000000 .*change a dim"):
         laid_over([Line((1.0, 2.0), (3.0, 4.0))])
 
     def unresolved(*_: object) -> object:
         return laid_over([Line((1.0, 2.0), (3.0, 4.0))])
 
     monkeypatch.setattr(builds, "build", unresolved)
-    with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a size"):
+    with pytest.raises(SbafabError, match=r"design 1dof-5mm cannot be resolved: .*change a dim"):
         builds.make_build(load_design("1dof-5mm"))
 
 

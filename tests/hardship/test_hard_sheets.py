@@ -106,10 +106,10 @@ FILES: dict[str, tuple[Change, str]] = {
     "zeros": (replaced(lambda path: path.write_bytes(b"\0" * 1_000_000)), "not an ASCII DXF"),
     "circles": (drawing(CIRCLE), "entities and points; the limit is"),
     "lines": (drawing("  0\nLINE\n"), "entities and points; the limit is"),
-    "pipe": (replaced(os.mkfifo), "not a plain file"),
-    "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "not a plain file"),
-    "link to itself": (replaced(lambda path: path.symlink_to(path)), "not a plain file"),
-    "folder": (replaced(Path.mkdir), "not a plain file"),
+    "pipe": (replaced(os.mkfifo), "not a regular file"),
+    "device": (replaced(lambda path: path.symlink_to("/dev/zero")), "not a regular file"),
+    "link to itself": (replaced(lambda path: path.symlink_to(path)), "not a regular file"),
+    "folder": (replaced(Path.mkdir), "not a regular file"),
 }
 
 
@@ -128,8 +128,8 @@ def test_bad_sheets_are_told_in_time(name: str, runs: Runs, output: Output) -> N
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (os.mkfifo, "not a plain file"),
-        (lambda path: path.symlink_to("/dev/zero"), "not a plain file"),
+        (os.mkfifo, "not a regular file"),
+        (lambda path: path.symlink_to("/dev/zero"), "not a regular file"),
         (lambda path: path.symlink_to(path), "cannot be read"),
     ],
     ids=["pipe", "device", "link to itself"],

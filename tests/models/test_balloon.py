@@ -11,7 +11,7 @@ import pytest
 
 from docs.scripts.axisymmetric import MeridianSection, axisymmetric_states
 from sbafab.errors import DesignError
-from sbafab.models import balloon
+from sbafab.models import film_elements
 from sbafab.models.balloon import inflate
 from sbafab.models.film_elements import Balloon
 from tests.quick import few
@@ -49,7 +49,7 @@ def test_a_film_that_cannot_stretch_between_plates_is_the_closed_limit() -> None
 def test_force_too_is_the_closed_limit_to_a_thousandth_with_more_elements(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(balloon, "FILM_ELEMENTS", 96)
+    monkeypatch.setattr(film_elements, "FILM_ELEMENTS", 96)
     discs = np.array([0.5, 1.5])
     limits = np.array([pressed_ideal(disc, 2.5) for disc in discs])
     found = inflate(replace(IDEAL), 100.0, limits[:, 0])
