@@ -414,7 +414,7 @@ def _compared(
         if name != MANIFEST and (name not in index.files or not os.path.lexists(actual)):
             difference = f"{name} is missing"
         elif not actual.is_file():
-            rule, difference = INTEGRITY, f"{name}: not a plain file"
+            rule, difference = INTEGRITY, f"{name}: not a regular file"
         elif cmp(actual, path, shallow=False):
             continue
         elif path.name == MANIFEST:
