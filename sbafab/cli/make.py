@@ -454,9 +454,9 @@ def _print_result(design: Design, result: runs.Result | None, folder: Path) -> N
     factors = runs.factors_of(design)
     if factors.calibration and runs.has_balloons(design.form):
         show.wrapped(
-            "(films as bought, pockets as drawn; predict takes the calibration "
-            f"{factors.calibration}: modulus times {factors.modulus_ratio:.3g}, pocket radius less "
-            f"{factors.pocket_loss:.2g} mm)"
+            "(film as bought, pockets as drawn; predict uses the calibration "
+            f"{factors.calibration}: {factors.modulus_ratio:.3g} times the modulus, pocket radii "
+            f"{factors.pocket_loss:.2g} mm smaller)"
         )
     outcome = "simulated" if result.stopped is None else "failed: the simulation stopped early"
     show.verdict(f"{design.name} {outcome}. Written to {folder}", folder)

@@ -423,7 +423,7 @@ class MapLimits:
         ]
 
     def worst(self, x: Array) -> tuple[float, Array]:
-        """Return by how much the limit that is missed most is exceeded, and its slopes by x."""
+        """Return the room left by the most violated limit, and its slopes by x."""
         grid, worst, slopes = self.units * x.reshape(self.units.shape), math.inf, self.units
         for a, b, constant, size in self.kinds:
             room = a @ grid @ b.T
@@ -491,9 +491,9 @@ def nearest_admissible(point: Array, metric: Array, limits: MapLimits) -> Array 
     """Return the x within the limits that is nearest to ``point`` (n,), by the squared distance
     d @ ``metric`` @ d; None if no such x is found.
 
-    Dual active set (Goldfarb and Idnani, Math. Programming 27 (1983) 1): the limit that is missed
-    most joins those that hold x, ``rows`` of the metric's root, which push x by ``pushes``; those
-    whose push would change its sign are let go.
+    Dual active set (Goldfarb and Idnani, Math. Programming 27 (1983) 1): each step adds the most
+    violated limit to the active ones, ``rows`` scaled by the metric's root with the multipliers
+    ``pushes``, and drops those whose multiplier would change its sign.
     """
     root = np.linalg.inv(np.linalg.cholesky(metric))
     x, rows, pushes, gram = point, np.zeros((0, len(point))), np.zeros(0), np.zeros((0, 0))

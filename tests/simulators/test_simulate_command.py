@@ -195,8 +195,8 @@ def test_a_result_says_which_films_and_pockets_it_is_of(risen: list[str]) -> Non
     """Simulators take neither the pressed film's modulus nor the pockets' loss of ``predict``."""
     factors = factors_of(sbafab.load("1dof-5mm"))
     words = " ".join(CliRunner().invoke(app, risen).stdout.split())
-    assert "(films as bought, pockets as drawn; predict takes the calibration paper:" in words
-    assert f"modulus times {factors.modulus_ratio:.3g}, pocket radius less" in words
+    assert "(film as bought, pockets as drawn; predict uses the calibration paper:" in words
+    assert f"{factors.modulus_ratio:.3g} times the modulus, pocket radii" in words
     own = " ".join(
         CliRunner().invoke(app, [*risen, "--set", "models.calibration=none"]).stdout.split()
     )
